@@ -32,34 +32,12 @@ from typing import Literal, Protocol, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rod.moment_curve import MomentCurve as MomentCurve
 from rod.spline import Cardinal, cardinal, evaluate, slope
 
 Array = NDArray[np.float64]
 Reading = Literal["tangent", "secant"]
 Abscissa = Literal["curvature", "excess"]
-
-
-class MomentCurve(Protocol):
-    """Anything that answers as a moment curve; `Characteristic` is the one built here.
-
-    All methods are vectorised: ``K`` (n,) in 1/m, ``K0`` scalar or (n,) in 1/m.
-    """
-
-    @property
-    def stiffness_scale(self) -> float:
-        """Typical size of the stiffness, N m^2; used for scaling only."""
-
-    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Bending moment m(K, K0), N m."""
-
-    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Tangent dm/dK, N m^2."""
-
-    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
-
-    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Derivative dm/dK0, N m^2."""
 
 
 class ParametricCurve(MomentCurve, Protocol):
@@ -79,7 +57,7 @@ def parametric(law: MomentCurve) -> TypeGuard[ParametricCurve]:
 
 
 @dataclass(frozen=True, eq=False)
-class Characteristic:
+class Characteristic(MomentCurve):
     """Natural cubic spline f through control points, and the moment curve that it means.
 
     Made by `from_ordinates` or `constant`.
@@ -151,20 +129,6 @@ class Characteristic:
     def _integral(self, u: Array) -> Array:
         """Primitive of f at the abscissa (n,), N m."""
         return evaluate(self._primitive, self._cardinal, u)
-
-    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Bending moment m(K, K0), N m, shape of ``K`` broadcast with ``K0``."""
-        u, u0, D = self._arguments(K, K0)
-        if self.reading == "secant":
-            return np.asarray(self.f(u) * D)
-        return np.asarray(self._integral(u) - self._integral(u0))
-
-    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Tangent reading dm/dK, N m^2."""
-        u, _, D = self._arguments(K, K0)
-        if self.reading == "tangent":
-            return self.f(u)
-        return np.asarray(self.f(u) + evaluate(slope(self._value), self._cardinal, u) * D)
 
     def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Secant reading m/(K - K0), N m^2, with its limit f(K0) at K = K0."""

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
-from rod.moment_curve import LawOfBend, MomentCurve, moment_curve
+from rod.moment_curve import LawOfBend, moment_curve
 
 Array = NDArray[np.float64]
 
@@ -262,25 +262,24 @@ class ComplianceLaw(LawOfBend):
 
     def bend(self, moment: ArrayLike) -> Array:
         """K - K0 of moments (n,) N m, 1/m."""
-        m, b = np.asarray(moment, float), self.basis
-        inside = self._rise(np.clip(m, b.moments[0], b.moments[-1]))
-        below, above = np.minimum(m - b.moments[0], 0.0), np.maximum(m - b.moments[-1], 0.0)
-        return np.asarray(inside + self.rates[0] * below + self.rates[-1] * above)
+        return self._beyond(self._rise, self.rates[[0, -1]], moment)
 
     def bend_by_coefficients(self, moment: ArrayLike) -> Array:
         """Derivative of `bend`, (n, p) 1/m."""
-        m, b = np.asarray(moment, float), self.basis
-        inside = self._rise_by(np.clip(m, b.moments[0], b.moments[-1]))
-        below, above = np.minimum(m - b.moments[0], 0.0), np.maximum(m - b.moments[-1], 0.0)
-        slopes = self.rates[[0, -1], None] * b.at_ends[[0, -1]]
-        return np.asarray(inside + below[:, None] * slopes[0] + above[:, None] * slopes[1])
+        return self._beyond(self._rise_by, self.rates[[0, -1], None] * self.basis.at_ends[[0, -1]], moment)
+
+    def _beyond(self, inside: CubicHermiteSpline, slopes: Array, moment: ArrayLike) -> Array:
+        """A spline over the moments of the basis, and straight with the slopes (2, ...) of its ends beyond them."""
+        m, (low, high) = np.asarray(moment, float), self.basis.moments[[0, -1]]
+        out = np.stack([np.minimum(m - low, 0.0), np.maximum(m - high, 0.0)], axis=-1)
+        return np.asarray(inside(np.clip(m, low, high)) + out @ slopes)
 
     # The moment curve -------------------------------------------------------------------------------------------------
 
     @cached_property
-    def curve(self) -> MomentCurve:
-        """The moment over the bend K - K0."""
-        return moment_curve(self.bends, self.basis.moments, 1.0 / self.rates)
+    def at(self) -> Callable[[Array], tuple[Array, Array]]:
+        """Function from bends (n,) to moment and tangent."""
+        return moment_curve(self.bends, self.basis.moments, 1.0 / self.rates).at
 
     @property
     def stiffness_scale(self) -> float:

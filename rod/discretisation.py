@@ -75,8 +75,6 @@ class Rod:
     def __post_init__(self) -> None:
         if self.elements.ndim != 1 or self.elements.size < 2 or np.any(self.elements <= 0.0):
             raise ValueError("elements must be a whole number, or so many positive relative lengths; at least two")
-        if self.section.pre_curvature.shape != (self.elements.size + 1,):
-            raise ValueError(f"the section needs one pre-curvature per joint, {self.elements.size + 1}")
         if not self.free_length > 0.0:
             raise ValueError(f"rigid pieces leave nothing of the length {self.length} m; it must be positive")
         if self.left.kind == "free":

@@ -26,8 +26,8 @@ import numpy as np
 
 from rod.characteristic import Array
 from rod.discretisation import Rod
-from rod.newton import Outcome, Start, Trial, descended, judged, newton, tilted
-from rod.path import PATH_STEPS, followed
+from rod.newton import PATH_STEPS, STEP_LIMIT, Outcome, Start, Trial, descended, judged, newton, tilted
+from rod.path import followed
 from rod.reduction import Balance, Hold, System
 from rod.section import Memory, Section
 
@@ -37,8 +37,6 @@ Branch = Literal["natural", "opposite", "up", "down", "jump"]
 
 BRANCHES = get_args(Branch)
 
-#: An edge that turns more, rad, from a warm start to where Newton's method ends may have passed to another branch.
-NEAR = 0.8
 #: Newton steps on a path that is not followed patiently: enough for one that leads to a chord at once.
 HASTY = 30
 
@@ -230,9 +228,9 @@ def _leads(rod: Rod, side: int) -> bool:
 
 
 def _near(system: System, first: Start) -> Trial:
-    """Newton's method from a start, if it ends near."""
+    """Newton's method from a start, if it ends as near as one step may lead: farther off is perhaps another branch."""
     warm = newton(system, first)
-    return warm if np.abs(warm.angles - first.angles).max() <= NEAR else warm._replace(outcome=Outcome.STALLED)
+    return warm if np.abs(warm.angles - first.angles).max() <= STEP_LIMIT else warm._replace(outcome=Outcome.STALLED)
 
 
 def _wound(system: System, trial: Trial, *, swung: bool = True) -> bool:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from rod.characteristic import Array, Characteristic, MomentCurve
+from rod.moment_curve import LawOfBend
 
 Function = Callable[[Array], ArrayLike]
 
@@ -26,7 +27,7 @@ FARTHEST, POINTS = 10.0, 600
 
 
 @dataclass(frozen=True)
-class StickSlip:
+class StickSlip(LawOfBend):
     """m = EI1 D + (EI0 - EI1) kc tanh(D / kc) with D = K - K0.
 
     Attributes
@@ -50,30 +51,10 @@ class StickSlip:
         """Larger of the two stiffnesses, N m^2."""
         return max(abs(self.EI0), abs(self.EI1))
 
-    def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Bending moment, N m."""
-        D = np.asarray(K, float) - np.asarray(K0, float)
-        return np.asarray(self.EI1 * D + (self.EI0 - self.EI1) * self.kc * np.tanh(D / self.kc))
-
-    def tangent(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Tangent dm/dK, N m^2."""
-        D = np.asarray(K, float) - np.asarray(K0, float)
-        return np.asarray(self.EI1 + (self.EI0 - self.EI1) * (1.0 - np.tanh(D / self.kc) ** 2))
-
-    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Function of K alone that returns moment and tangent."""
-        slip = self.EI0 - self.EI1
-
-        def moment_and_tangent(K: Array) -> tuple[Array, Array]:
-            D = K - K0
-            t = np.tanh(D / self.kc)
-            return self.EI1 * D + (slip * self.kc) * t, self.EI1 + slip * (1.0 - t * t)
-
-        return moment_and_tangent
-
-    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
-        """Derivative dm/dK0 = -dm/dK, N m^2."""
-        return -self.tangent(K, K0)
+    def at(self, bend: Array) -> tuple[Array, Array]:
+        """Moment and tangent at bends (n,)."""
+        slip, t = self.EI0 - self.EI1, np.tanh(bend / self.kc)
+        return self.EI1 * bend + (slip * self.kc) * t, self.EI1 + slip * (1.0 - t * t)
 
 
 def as_law(given: MomentCurve | float | Function | ArrayLike, *, length: float) -> MomentCurve:

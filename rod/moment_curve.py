@@ -1,7 +1,6 @@
-"""A moment curve over the bend K - K0 alone: points with tangents, cubic between them.
+"""What answers as a moment curve m(K, K0), and laws of the bend K - K0 alone: points with tangents, cubic between them.
 
-Every law of this kind moves with the pre-curvature K0 and lacks only its points; `rod.compliance_law` and
-`rod.stiffness_law` say how they come from coefficients.
+`rod.compliance_law` and `rod.stiffness_law` say how the points come from coefficients.
 
 Units: bend and curvature in 1/m, moments in N m, tangents in N m^2.
 """
@@ -19,8 +18,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class MomentCurve:
-    """A moment curve through (bend, moment) points with the tangents there, cubic between, straight beyond them.
+class CubicCurve:
+    """Moment over the bend through (bend, moment) points with the tangents there, cubic between, straight beyond them.
 
     Attributes
     ----------
@@ -42,7 +41,7 @@ class MomentCurve:
         return ((d * t + c) * t + b) * t + a, (3.0 * d * t + 2.0 * c) * t + b
 
 
-def moment_curve(K: Array, m: Array, f: Array) -> MomentCurve:
+def moment_curve(K: Array, m: Array, f: Array) -> CubicCurve:
     """The curve through bends K (g,) and moments m (g,) with tangents f (g,)."""
     h = np.diff(K)
     mean = np.diff(m) / h
@@ -51,15 +50,18 @@ def moment_curve(K: Array, m: Array, f: Array) -> MomentCurve:
     table[2, 1:-1] = (3.0 * mean - 2.0 * f[:-1] - f[1:]) / h
     table[3, 1:-1] = (f[:-1] + f[1:] - 2.0 * mean) / h**2
     table[0, 0], table[1, 0], table[0, -1], table[1, -1] = m[0], f[0], m[-1], f[-1]
-    return MomentCurve(K, table, np.concatenate([K[:1], K]))
+    return CubicCurve(K, table, np.concatenate([K[:1], K]))
 
 
-class LawOfBend(Protocol):
-    """What moment curves over the bend K - K0 have in common: from their ``curve`` to moment and derivatives."""
+class MomentCurve(Protocol):
+    """Anything that answers as a moment curve, by its ``bound``; ``K`` (n,) in 1/m, ``K0`` scalar or (n,) in 1/m."""
 
     @property
-    def curve(self) -> MomentCurve:
-        """The moment over the bend K - K0."""
+    def stiffness_scale(self) -> float:
+        """Typical size of the stiffness, N m^2; used for scaling only."""
+
+    def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
 
     def moment(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Bending moment m(K, K0), N m."""
@@ -69,9 +71,21 @@ class LawOfBend(Protocol):
         """Tangent dm/dK, N m^2."""
         return self.bound(np.asarray(K0, float))(np.asarray(K, float))[1]
 
+    def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
+        """Derivative dm/dK0, N m^2."""
+
+
+class LawOfBend(MomentCurve, Protocol):
+    """A law of the bend K - K0 alone: it moves with the pre-curvature, and lacks only moment and tangent at a bend."""
+
+    @property
+    def at(self) -> Callable[[Array], tuple[Array, Array]]:
+        """Function from bends (n,) to moment and tangent."""
+
     def bound(self, K0: Array) -> Callable[[Array], tuple[Array, Array]]:
         """Function of K alone that returns moment and tangent, for given K0 (n,) or (1,)."""
-        return lambda K: self.curve.at(K - K0)
+        at = self.at
+        return lambda K: at(K - K0)
 
     def moment_by_pre_curvature(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Derivative dm/dK0, N m^2: the law moves with K0."""

@@ -25,9 +25,11 @@ RESIDUAL_TOLERANCE = 1e-9
 #: Largest turn of an edge in one Newton step, rad.
 STEP_LIMIT = 0.8
 ITERATIONS = 25
-#: Largest turn of an edge in a step downhill, rad, and how many such steps a cable takes at most to come to rest.
-DESCENT_LIMIT, DESCENT_STEPS = 0.3, 300
-#: How far beside an unstable equilibrium the way down begins, rad (root mean square).
+#: Largest turn of an edge in a step downhill, rad.
+DESCENT_LIMIT = 0.3
+#: Steps after which a path, or the way down to rest, is given up; a nearly straight bar (K0 L = 2e-8) needs 270.
+PATH_STEPS = 600
+#: How far beside an unstable equilibrium the way down begins or goes on, rad (root mean square).
 TILT = 1e-2
 
 
@@ -144,7 +146,7 @@ def descended(system: System, start: Start) -> Trial:
     angles, R = start.angles, system.hold.reaction(start.reaction)
     mass = system.moment_scale * system.mass
     shift = 1.0
-    for count in range(1, DESCENT_STEPS + 1):
+    for count in range(1, PATH_STEPS + 1):
         balance = system.balance(angles, R)
         shifted = balance._replace(diagonal=balance.diagonal + shift * mass)
         here = system.eliminated(shifted, -balance.gradient[:, None], -balance.gap[:, None])
@@ -154,11 +156,13 @@ def descended(system: System, start: Start) -> Trial:
             shift = 4.0 * max(shift, 0.1)
             continue
         angles, R = angles + dalpha[:, 0], R + dR[:, 0]
-        if shift < 0.01 and step < 0.01:
-            trial = newton(system, Start(angles, R))
-            return trial._replace(steps=trial.steps + count)
-        shift *= 0.25 if step < 0.5 * DESCENT_LIMIT else 1.0
-    return Trial(*start, system.balance(*start), DESCENT_STEPS, Outcome.STALLED)
+        if step <= STEP_TOLERANCE:  # at rest: at a minimum, or on a saddle, where a symmetric cable would stay for long
+            if system.excess_negatives(balance) == 0:
+                trial = newton(system, Start(angles, R))
+                return trial._replace(steps=trial.steps + count)
+            angles = angles + TILT * softest(system, balance)[1]
+        shift *= 0.25
+    return Trial(*start, system.balance(*start), PATH_STEPS, Outcome.STALLED)
 
 
 def softest(system: System, balance: Balance, mode: Array | None = None) -> tuple[float, Array]:

@@ -42,8 +42,6 @@ PAPER_START = (0.01, 1.0)
 FURTHER_TURNS = (0.1, 0.4, 0.8)
 #: Residuals below this, relative to the data, are rounding; gradients (cosines) below the other are at a minimum.
 EXACT, STATIONARY = 1e-8, 1e-4
-#: Of a rod that is held against forces alone.
-ELEMENTS = 100
 #: Relative change of objective and parameters at which the method stops.
 SETTLED = 1e-12
 
@@ -52,7 +50,7 @@ SETTLED = 1e-12
 class Virtual:
     """Data of the fit: displacements and forces (n,) m, N; curvatures at the joints (n, elements + 1) 1/m or None.
 
-    The simulated rod has joints where the curvatures are: `ELEMENTS` where there are none.
+    The simulated rod has joints where the curvatures are, and as many as any where there are none.
     """
 
     length: float
@@ -69,9 +67,9 @@ class Virtual:
             raise ValueError("give one displacement, one force and one row of curvatures for each step")
 
     @property
-    def elements(self) -> int:
+    def elements(self) -> int | Array:
         """Number of elements of the simulated rod."""
-        return ELEMENTS if self.curvatures is None else self.curvatures.shape[1] - 1
+        return BendingTest.elements if self.curvatures is None else self.curvatures.shape[1] - 1
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ class Directions:
     def weights(self) -> Array:
         """Change of the joint weights with the edges, (q, n)."""
         inner = 0.5 * self.edges
-        inner[:, [0, -1]] = 0.0
+        inner[:, :: inner.shape[1] - 1] = 0.0
         return np.asarray(inner[:, 1:] + inner[:, :-1])
 
     @cached_property

@@ -29,7 +29,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rod.characteristic import Array
-from rod.newton import RESIDUAL_TOLERANCE, STEP_LIMIT, STEP_TOLERANCE, Outcome, Start, Trial, softest
+from rod.newton import PATH_STEPS, RESIDUAL_TOLERANCE, STEP_LIMIT, STEP_TOLERANCE, Outcome, Start, Trial, softest
 from rod.reduction import Balance, System
 
 #: Longest and shortest step along the path, root mean square of the turns of the edges, rad.
@@ -41,16 +41,12 @@ OFF = 0.6
 #: Largest turn of an edge by which a path is followed at once to an imposed chord, rad. At 2.405, the zero of J0, the
 #: ends of a straight cable meet.
 LEAP = 2.4
-#: A path gives up after so many Newton steps; a shallow arch (K0 L = 0.002) needs 100.
-PATH_STEPS = 600
 #: Reactions below this times EI/L^2 count absolutely, larger ones relative to themselves; Euler's load is 9.87.
 REACTION = 20.0
-#: Turn of the first state on a new branch, rad (root mean square), tried one after the other.
-BRANCHING = (0.1, 0.01)
-#: Halvings of a step to locate a critical point, and the stiffness below which it is one, relative to EI/L.
+#: Turn of the first state on a new branch, rad (root mean square).
+BRANCHING = 0.01
+#: Halvings of a step to locate a critical point or where ends meet, and the stiffness, over EI/L, of a critical point.
 LOCATING, CRITICAL = 24, 1e-3
-#: Halvings of a step to find where the ends meet.
-MEETING = 10
 
 
 class Point(NamedTuple):
@@ -141,7 +137,7 @@ class Ramp:
         if there is None or there.share > 1.0:
             return None
         planned, off, mass = (goal - here.state)[:-3], (there.state - goal)[:-3], self.system.mass
-        near = mass @ off**2 < OFF**2 * (mass @ planned**2) + 0.01**2
+        near = mass @ off**2 < OFF**2 * (mass @ planned**2) + STEP_TOLERANCE**2
         between = self.system.section(0.5 * (here.balance.K + there.balance.K))[1]
         return there if near and np.all(between > 0.0) else None
 
@@ -157,7 +153,7 @@ class Ramp:
             return bool(one * other < 0.0)
 
         behind, low, span = there, 0.0, there.state - here.state
-        for halving in range(1, MEETING + 1) if passed(there) else ():
+        for halving in range(1, LOCATING + 1) if passed(there) else ():
             middle = self.corrected(here.state + (low + 0.5**halving) * span, way)
             if middle is None:
                 return there
@@ -231,7 +227,7 @@ def _leap(ramp: Ramp, here: Point, way: Array) -> Point | None:
         return None
     angles = begin + brentq(beyond, 0.0, LEAP / largest, rtol=1e-4) * turns
     still = ramp.system.balance(angles, np.zeros(2))
-    R = np.linalg.lstsq(still.border.T / rod.length, -still.gradient / rod.length, rcond=None)[0]
+    R = np.linalg.lstsq(still.border.T, -still.gradient, rcond=None)[0]
     there = ramp.reached(here, np.r_[angles, R, 1.0], ramp.along_share)
     return None if there is None or ramp.negatives(there) else there
 
@@ -258,16 +254,13 @@ def _branched(ramp: Ramp, here: Point, way: Array, mode: Array, side: int) -> Po
     rod = ramp.system.rod
     lift = rod.bow(angles + 1e-3 * mode) - rod.bow(angles - 1e-3 * mode)
     own = float(ramp.system.mass @ (way[:-3] * mode))
-    sign = -1.0 if (own if abs(own) > 1e-3 else side * lift) < -1e-9 else 1.0
-    aside = np.r_[sign * mode, np.zeros(3)]
-    for size in BRANCHING:
-        there = ramp.corrected(here.state + size * aside, aside)
-        if there is not None and there.share > 1.0:
-            # the share grows with the square of the turn
-            part = np.sqrt((1.0 - here.share) / (there.share - here.share))
-            goal = here.state + part * size * aside + 2.0 * (1.0 - here.share) * ramp.half
-            goal[-1] = 1.0
-            there = ramp.corrected(goal, ramp.along_share)
-        if there is not None and there.share >= here.share and not ramp.negatives(there):
-            return there
-    return None
+    sign = -1.0 if (own if abs(own) > 1e-9 else side * lift) < 0.0 else 1.0
+    aside = BRANCHING * np.r_[sign * mode, np.zeros(3)]
+    there = ramp.corrected(here.state + aside, aside)
+    if there is not None and there.share > 1.0:
+        # the share grows with the square of the turn
+        part = np.sqrt((1.0 - here.share) / (there.share - here.share))
+        goal = here.state + part * aside + 2.0 * (1.0 - here.share) * ramp.half
+        goal[-1] = 1.0
+        there = ramp.corrected(goal, ramp.along_share)
+    return there if there is not None and there.share >= here.share and not ramp.negatives(there) else None

@@ -77,10 +77,11 @@ class Hold:
         """Whether the x and the y position of the right axis are imposed."""
         return self.chord is not None, self.tip is None
 
-    def yielded(self, along: float) -> tuple[float, float]:
-        """What the rig yields under a reaction along the chord, m, and its derivative, m/N; in the direction of it."""
+    def yielded(self, along: float) -> tuple[float, float, float, float]:
+        """What the rig yields under a reaction along the chord, m; its slope by that, compliance and stiffening."""
         softer = 1.0 + self.stiffening * abs(along)
-        return self.compliance * along / softer, self.compliance / softer**2
+        slope = self.compliance / softer**2
+        return self.compliance * along / softer, slope, along / softer, -slope * along * abs(along)
 
     def reaction(self, R: Array) -> Array:
         """The reaction R (2,) N with the components that are prescribed by force put in."""
@@ -143,7 +144,7 @@ class System:
         self._axial, self._shear = rod.flexibility
         self._difference = self._axial - self._shear
         self._even_softness = np.array(((self._axial * rod.length, 0.0), (0.0, self._axial * rod.length)))
-        self._middle, self._spring = rod.edges.size // 2, 3.0 * self.moment_scale
+        self._middle, self._spring = rod.edges.size // 2, self.moment_scale
         self._imposed = slice(hold.imposed.count(False), 2)  # x and y, y, or none
         units = [self.force_scale / rod.length] * hold.imposed.count(True) + [1.0 / self.moment_scale]
         self._scale = np.sqrt(units)[:, None]

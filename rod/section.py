@@ -207,10 +207,6 @@ class Section:
         largest = np.maximum(memory.reached, K - self.pre_curvature)
         return np.asarray(self.plastic_rate * (largest - self.set_threshold) + self.given(memory))
 
-    def rest_curvature(self, K: Array, memory: Memory) -> Array:
-        """Pre-curvature with the set that goes with curvature K, (n,) 1/m."""
-        return np.asarray(self.pre_curvature + self.set_at(K, memory))
-
     def read(self, K: Array, p: Array) -> tuple[Read, ...]:
         """Where the law is read for curvature K and set p: its moment is ``sum share * law.moment(at, K0)``."""
         if self.law_stays:

@@ -186,11 +186,9 @@ def _explicit(
     rod, hold = step.rod, step.hold
     position = moves.scalar("chord") if hold.chord is not None else moves.none
     if hold.from_zero:
-        position = position - moves.scalar("displacement_offset")
-        along = float(step.right_reaction[0])
-        softer = 1.0 + hold.stiffening * abs(along)
-        yields = moves.scalar("rig_compliance") - moves.scalar("rig_stiffening") * hold.compliance * abs(along) / softer
-        position = position + rest.zero - yields * along / softer
+        *_, compliance, stiffening = hold.yielded(float(step.right_reaction[0]))
+        yields = compliance * moves.scalar("rig_compliance") + stiffening * moves.scalar("rig_stiffening")
+        position = position + rest.zero - moves.scalar("displacement_offset") - yields
     reaction = -moves.scalar("force") if hold.force is not None else moves.none
     load = None
     if rod.vertex_load is not None or moves.has("load_x", "load_y"):

@@ -13,6 +13,7 @@ Units: bends in 1/m, stiffness in N m^2. Beyond the bends of its basis the stiff
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rod.compliance_law import ComplianceLaw, LawBasis
-from rod.moment_curve import LawOfBend, MomentCurve, moment_curve
+from rod.moment_curve import LawOfBend, moment_curve
 
 Array = NDArray[np.float64]
 
@@ -40,9 +41,9 @@ class StiffnessLaw(LawOfBend):
         return self.rise.basis
 
     @cached_property
-    def curve(self) -> MomentCurve:
-        """The moment over the bend K - K0."""
-        return moment_curve(self.basis.moments, self.rise.bends, self.rise.rates)
+    def at(self) -> Callable[[Array], tuple[Array, Array]]:
+        """Function from bends (n,) to moment and tangent."""
+        return moment_curve(self.basis.moments, self.rise.bends, self.rise.rates).at
 
     @property
     def stiffness_scale(self) -> float:

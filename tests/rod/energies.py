@@ -29,8 +29,8 @@ def section_stored(section, K, memory):
     energy = _of_law(section, K, section.set_at(K, memory)) * (1.0 if section.profile is None else section.profile)
     if section.friction is None:
         return energy
-    u = np.clip((K - memory.relaxed) / section.friction.stick, -1.0, 1.0)
-    return energy + 0.5 * (section.friction.slip * section.friction.stick * u**2).sum(axis=0)
+    q = section.friction.share(K, memory)[0]
+    return energy + 0.5 * (section.friction.slip * section.friction.stick * q**2).sum(axis=0)
 
 
 def section_potential(section, K, memory):
@@ -46,8 +46,11 @@ def section_potential(section, K, memory):
     energy = energy * (1.0 if section.profile is None else section.profile)
     if section.friction is None:
         return energy
-    u = np.abs((K - memory.relaxed) / section.friction.stick)
-    element = np.where(u < 1.0, 0.5 * u**2, u - 0.5) * section.friction.stick
+    u, c, k = np.abs((K - memory.relaxed) / section.friction.stick), section.friction.stick, section.friction.smooth
+    element = np.where(u < 1.0, 0.5 * u**2, u - 0.5) * c
+    # one that gives way gradually: what it stored before the step, and its moment integrated over the way d of it
+    way, d, before = np.sign(K - memory.last), np.abs(K - memory.last), (memory.last - memory.relaxed[k]) / c[k]
+    element[k] = 0.5 * c[k] * before**2 + d - (1.0 - way * before) * c[k] * (1.0 - np.exp(-d / c[k]))
     return energy + (section.friction.slip * element).sum(axis=0)
 
 

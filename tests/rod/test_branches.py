@@ -201,6 +201,50 @@ def test_shape_after_the_snap_is_found_when_asked_for() -> None:
     assert simulate(test, chords=[test.zero_chord], starts=[snapped])[0].outcome is Outcome.BIFURCATION
 
 
+@pytest.mark.parametrize("branch", ["up", "down", "jump"])
+def test_a_trial_without_patience_ends_where_the_path_from_the_force_free_shape_does(branch: str) -> None:
+    test = arch(20.0)
+    asked = test.hold("displacements", 0.0)
+    trial, patient = (solve(test.rod, asked, branch=branch, patient=given) for given in (False, True))
+    assert trial.outcome is Outcome.BIFURCATION
+    assert trial.iterations < patient.iterations
+
+
+HELD = {"left": {"left": CLAMP}, "right": {"right": CLAMP}, "spring": {"left": Support(stiffness=0.125)}}
+
+
+@pytest.mark.parametrize("K0", [1e-6, 1e-4, 1e-3, 3e-3, 1e-2])
+@pytest.mark.parametrize("held", HELD)
+def test_a_nearly_straight_bar_follows_the_straight_one_round_the_corner_where_that_buckles(held, K0) -> None:
+    """Beside its path lies another one, bowed to the other side, that begins at nothing and loses its stability."""
+    straight, bent = (BendingTest(0.2, LINEAR, bend, elements=60, **HELD[held]) for bend in (0.0, K0))
+    near, step = (simulate(test, chords=[0.02])[0] for test in (straight, bent))
+    assert step.good and step.iterations < 300  # once round the corner, steps grow by and by: half of it
+    assert step.force * 0.2**2 / 5e-3 == pytest.approx(near.force * 0.2**2 / 5e-3, abs=10.0 * K0 * 0.2)  # order of K0 L
+    load = 1.005 * simulate(straight, chords=[0.9999 * 0.2])[0].force
+    near, step = (simulate(test, forces=[load])[0] for test in (straight, bent))
+    assert step.good
+    assert step.chord / 0.2 == pytest.approx(near.chord / 0.2, abs=5.0 * K0 * 0.2)
+
+
+@pytest.mark.parametrize("K0", [-1e-2, -1e-4, -1e-6, 1e-6, 1e-4, 1e-2])
+def test_the_least_pre_curvature_tells_the_side_to_which_a_column_buckles(K0: float) -> None:
+    column = BendingTest(0.2, LINEAR, K0, elements=60, left=CLAMP, right=FREE)
+    step = solve(column.rod, Hold(tip=(-0.5 * np.pi**2 * 5e-3 / 0.2**2, 0.0)))
+    assert step.good and step.y[-1] * K0 < 0.0  # curvature K0 = -dtheta/ds turns the free end down
+
+
+@pytest.mark.parametrize("K0", [0.0, 1e-3, 0.1])
+def test_a_symmetric_bow_that_jumps_does_not_stay_on_a_saddle(K0: float) -> None:
+    """Softening, it bows ever farther under its load, its ends pass each other, and it turns round one bearing."""
+    test = BendingTest(0.2, StickSlip(5e-3, 3e-3, 7.0), K0, elements=60)
+    step = simulate(test, forces=[6.0 * np.pi**2 * 5e-3 / 0.2**2], branch="jump")[0]
+    assert step.good
+    assert step.chord == pytest.approx(-0.2, rel=1e-4)
+    V = Potential(test.rod, step.before)
+    assert is_minimum(V, V.unknowns(step.angles, step.x, step.y), V.free(x_imposed=False))
+
+
 @pytest.mark.parametrize("K0", [5.0, 8.0])
 def test_other_side_of_a_taut_cable_does_not_exist(K0: float) -> None:
     step = simulate(BendingTest(0.2, LINEAR, K0), chords=[0.1999], branch="down")[0]

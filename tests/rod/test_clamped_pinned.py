@@ -23,7 +23,7 @@ from rod.support import Support
 
 EI, LENGTH = 5e-3, 0.2
 BAR = BendingTest(LENGTH, Characteristic.constant(EI), left=Support("clamp", angle=0.0))
-CRITICAL = 20.190728556  # tan u = u; Timoshenko and Gere, Art. 2.4
+CRITICAL = 20.190728556  # tan u = u; Timoshenko and Gere, chapter 2
 NODES = 100
 
 

@@ -52,6 +52,8 @@ def test_a_cable_under_covers_is_the_circle_that_is_seen_between_them(hidden):
     assert np.all(free[inside] == 1.0) and (free.min() == 0.0) == any(hidden)
     under = curve[:, 0] < hidden[0]
     assert free[under] == pytest.approx(curve[under, 0] / max(hidden[0], 1e-9), abs=1e-6)
+    beyond = curve[:, 0] > LENGTH - hidden[1]
+    assert free[beyond] == pytest.approx((LENGTH - curve[beyond, 0]) / max(hidden[1], 1e-9), abs=1e-6)
 
 
 def test_a_photo_whose_axes_were_found_beside_their_place_lies_on_the_curve_turned_alike():

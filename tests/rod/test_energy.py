@@ -25,7 +25,7 @@ EVERYTHING = replace(
     load=(0.05, 0.1),
     left=Support(stiffness=2e-3, friction_moment=3e-4, rigid_length=4e-3, moment=1e-4),
     right=Support(stiffness=1e-3, friction_moment=2e-4),
-    friction=InternalFriction(1e-3, 1.5),
+    friction=InternalFriction(1e-3, 1.5, beside=InternalFriction(5e-4, 2.0, elements=2, gradual=True)),
     plastic_rate=0.05,
     grown=np.full((2, 31), 0.2),
 )
@@ -111,6 +111,13 @@ def test_inertia_where_a_pivot_vanishes(unit: float) -> None:
     assert negative_pivots(diagonal, off) == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0.0)
 
 
+def test_a_matrix_without_inverse_has_no_solution_and_proves_no_minimum() -> None:
+    step = simulate(PLAIN, [0.009])[0]
+    none = step.balance._replace(diagonal=np.zeros(32), off=np.zeros(31))
+    assert np.isnan(step.system.solve(none, np.ones((32, 1)), np.zeros((2, 1)))[0]).all()
+    assert step.system.excess_negatives(none) == 1
+
+
 @pytest.mark.parametrize("turn", [0.3, 2.0, -1.1])
 def test_turning_and_shifting_the_world_changes_nothing(turn: float) -> None:
     V, q = state(simulate(PLAIN, [0.009])[-1])
@@ -164,6 +171,7 @@ def test_work_done_becomes_energy_along_a_loading_path() -> None:
 
 FRICTIONAL = {
     "internal friction": {"friction": InternalFriction(1e-3, 1.5)},
+    "internal friction that gives way gradually": {"friction": InternalFriction(1e-3, 1.5, gradual=True)},
     "bearing friction": {"left": Support(friction_moment=6e-4), "right": Support(friction_moment=3e-4)},
     "plastic set": {"plastic_rate": 0.1},
     "plastic set beyond a threshold": {"plastic_rate": 0.1, "set_threshold": 1.5},

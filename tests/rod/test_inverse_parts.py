@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rod.compliance_law import moment_basis
 from rod.inverse import estimate
 from rod.inverse.base_fit import base_fit
+from rod.inverse.laws import SOFTER, AnyLaw
 from rod.inverse.prediction import facts_of
 from rod.midline import block_covariance, midline
 from tests.rod.virtual_cable import StickSlip, force_free
@@ -19,6 +21,18 @@ CHORDS = force_free(LAW, LENGTH).chord - np.array([5e-3, 10e-3, 15e-3])
 
 def measured(**kind):
     return bending_test(LAW, LENGTH, CHORDS, np.random.default_rng(2), **kind)[0]
+
+
+@pytest.mark.parametrize(("low", "high", "farther"), [(0.0, 0.05, 1.0), (-0.02, 0.04, 1.0), (-0.04, 0.02, 0.0)])
+@pytest.mark.parametrize(("over", "sign"), [("bend", 1.0), ("moment", -1.0)])
+def test_a_law_softens_by_what_its_logarithm_falls_from_rest_to_the_farther_end(low, high, farther, over, sign):
+    basis = moment_basis(low, high, unit=60.0)
+    knots = basis.spline.t
+    greville = (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0  # coefficients of the abscissa itself
+    told, by = AnyLaw(basis, over).softening(greville)
+    rest = -low / (high - low)
+    assert told * SOFTER[1] + SOFTER[0] == pytest.approx(sign * (rest - farther), abs=1e-9)
+    assert told == pytest.approx(by @ greville - SOFTER[0] / SOFTER[1])
 
 
 def test_the_chord_of_a_photo_is_the_distance_of_its_ends():

@@ -1,5 +1,7 @@
 """Steps of a fit within bounds, and fits whose minimum lies on one."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,14 @@ def test_a_number_at_its_bound_does_not_hold_the_others_back():
     # how far one step goes is no bound of what is to be gained
     short = Linearised(jacobian, residual, 1e-7, NOTHING, bound)
     assert short.step(0.0) == pytest.approx([2.0, 1.0]) and short.expected_fall == pytest.approx(13.0)
+
+
+def test_amounts_keep_their_sign_and_places_their_range_whatever_these_are():
+    variant = SimpleNamespace(tuned=["place"], range=lambda _: (0.2, 0.9))
+    term = SimpleNamespace(sign=-1.0, cause=SimpleNamespace(plausible=lambda _: 2.0), variant=variant)
+    bounds = lasting(SimpleNamespace(size=3, amounts_at=[1], terms=[term], facts=None), np.array([7.0, -1.5, 0.3]))
+    for farthest in ([0.0, 1.5, 0.0], [0.0, 0.0, -0.1], [0.0, 0.0, 0.6], [5.0, 1.5, 0.6]):
+        assert np.min(bounds.rows @ np.array(farthest) - bounds.least) == pytest.approx(0.0, abs=1e-12)
 
 
 def at_the_border():

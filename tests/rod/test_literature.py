@@ -3,12 +3,14 @@
     Mattiasson, Int. J. Num. Meth. Eng. 17 (1981), pp. 145-153, Table 1: cantilever, force across its tip
     Bisshopp and Drucker, Quart. Appl. Math. 3 (1945), pp. 272-275: the same by elliptic integrals
     Greenhill, Proc. Camb. Phil. Soc. 4 (1881), pp. 65-73: column under its own weight, 7.837
-    Timoshenko and Gere, Theory of Elastic Stability, 2nd ed. (1961), Table 2-4 (elastica), Arts. 2.1, 2.3, 2.4, 2.7
+    Timoshenko and Gere, Theory of Elastic Stability, 2nd ed. (1961), Art. 2.7 (the elastica), p. 78, Table 2-4
     Castigliano's theorem
 
-Pages of articles are those of the whole article, as others cite it. The book could not be seen for this: its table and
-articles stand without page, and each row of Table 2-4 is held against the elliptic integral that it was computed from.
-Where no table exists, scipy's collocation solver, which knows neither edges nor joints.
+Pages are as others cite them: of articles those of the whole article, of the book the page that the verification manual
+of ANSYS, problem VM136, names for the loads from 1.015 to 1.884 and, from 60 degrees on, the places of the tip, which
+are those here. Each row of the table is held against the elliptic integral that it was computed from. Critical loads of
+other ends (chapter 2 of the book) are roots of their own equations, given beside them. Where no table exists, scipy's
+collocation solver, which knows neither edges nor joints.
 """
 
 from dataclasses import replace
@@ -38,7 +40,7 @@ STRAIGHT = BendingTest(LENGTH, LINEAR)
 CANTILEVER = BendingTest(LENGTH, LINEAR, left=CLAMP, right=Support("free"), elements=200)
 NO_FORCE = Hold(tip=(0.0, 0.0))
 
-#: Timoshenko and Gere, Art. 2.4 and Fig. 2-7: critical load over Euler's for the ends of a bar.
+#: Timoshenko and Gere, chapter 2: critical load over Euler's for the ends of a bar.
 CASES = {
     "pinned": (STRAIGHT, 1.0),
     "clamped-pinned": (replace(STRAIGHT, left=CLAMP), 20.190728556 / np.pi**2),  # tan u = u
@@ -101,7 +103,7 @@ def test_bisshopp_and_drucker_elliptic_integrals(load):
     assert step.x[-1] / LENGTH == pytest.approx(across, abs=2e-5)
 
 
-#: Timoshenko and Gere, Table 2-4: slope of the tip in degrees, P / P_cr, x_a / l, y_a / l.
+#: Timoshenko and Gere, p. 78, Table 2-4: slope of the tip in degrees, P / P_cr, x_a / l, y_a / l.
 TABLE_2_4 = [
     (20, 1.015, 0.970, 0.220),
     (40, 1.063, 0.881, 0.422),
@@ -212,7 +214,7 @@ def test_timoshenko_and_gere_table_2_4_pinned_bar_under_its_load(degrees, ratio,
 
 
 def test_bar_on_springs_buckles_where_the_transcendental_equation_says():
-    # Timoshenko and Gere, Art. 2.3: equal springs c, symmetric mode: tan u = -2 EI u / (c L), u = kL/2.
+    # Timoshenko and Gere, chapter 2: equal springs c, symmetric mode: tan u = -2 EI u / (c L), u = kL/2.
     for spring in (0.5, 2.0, 10.0):  # c L / EI
         u = brentq(lambda u, c=spring: c * np.sin(u) + 2.0 * u * np.cos(u), 0.5 * np.pi, np.pi)
         held = Support(stiffness=spring * EI / LENGTH)

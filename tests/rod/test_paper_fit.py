@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES, simulate, table_1
+from rod.bending_test import TABLE_1, TABLE_1_KNOTS, TABLE_1_ORDINATES, BendingTest, simulate, table_1
 from rod.paper import virtual_data
 from rod.paper_fit import Virtual, paper_fit
 from tests.rod.elastica import uniform_equilibrium
@@ -77,6 +77,18 @@ def test_too_few_data_are_a_mistake():
     with pytest.raises(ValueError, match="do not determine"):
         paper_fit(one, TABLE_1_KNOTS)
     assert paper_fit(one, (0.0, 8.0)).characteristic.ordinates.size == 2  # as many as the forces, with K0
+
+
+def test_a_start_without_equilibrium_is_refused_and_a_further_one_left_out():
+    with pytest.raises(ValueError, match=r"no equilibrium at the start EI = 0.01 N m\^2, K0 = 30.0 1/m"):
+        paper_fit(virtual("tangent"), TABLE_1_KNOTS, start=(0.01, 30.0))
+    far = np.array([0.3, 0.6, 0.98]) * 0.2  # of the further starts the most bent one has no chord left for the last
+    steps = simulate(BendingTest(0.2, 5e-3, 0.5, elements=50), far)
+    forces = np.array([1.0, 1.02, 1.0]) * [step.force for step in steps]  # met by no law exactly
+    fitted = paper_fit(Virtual(0.2, far, forces, np.array([step.kappa for step in steps])), [0.0, 20.0])
+    assert fitted.converged
+    begun = sorted(end.history[0].pre_curvature for end in (fitted, *fitted.others))
+    assert begun == pytest.approx([0.5, 1.0, 2.0])  # 4.0 is not among them
 
 
 def test_data_are_rows_of_one_step_each():

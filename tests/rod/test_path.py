@@ -8,7 +8,7 @@ import pytest
 from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Outcome, bow_side, solve
 from rod.laws import StickSlip
-from rod.newton import Start, descended, softest
+from rod.newton import Start, descended, newton, softest
 from rod.path import Ramp, followed
 from rod.reduction import Hold, System
 from rod.support import Support
@@ -104,3 +104,15 @@ def test_a_leap_to_an_unstable_shape_is_not_taken():
     V = Potential(replace(test, load=(0.0, -5.0 * share)).rod, step.before)
     q = V.unknowns(step.angles, step.x, step.y)
     assert np.abs(V.gradient(q)[V.free()]).max() < 1e-6 * step.force
+
+
+def test_a_step_of_newtons_method_turns_no_edge_by_more_than_its_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rod.newton.ITERATIONS", 1)
+    test = replace(STRAIGHT, pre_curvature=2.0)
+    mounted = test.rod.mounted.angles
+    for chord, most in ((0.1 * LENGTH, 0.8), (0.998 * test.zero_chord, None)):  # a short step is taken as a whole
+        system = System(test.rod, test.hold("chords", chord), test.rod.virgin)
+        balance = system.balance(mounted, np.zeros(2))
+        whole = system.solve(balance, -balance.gradient[:, None], -balance.gap[:, None])[0]
+        taken = newton(system, Start(mounted, np.zeros(2))).angles - mounted
+        assert np.abs(taken).max() == pytest.approx(most or np.abs(whole).max(), rel=1e-9)
