@@ -75,6 +75,8 @@ class BendingTest:
         Whether the law stays at its curvature while K0 grows; else it moves along (see `rod.section`).
     set_threshold : 1/m
         Bend from rest beyond which K0 grows.
+    set_saturation : m
+        How fast that growth falls with the bend (see `rod.section`).
     grown : (steps, elements + 1) 1/m or None
         Growth of K0 at the joints that is given step by step; the last one stays.
     zero : "natural", "loaded", "length" or m
@@ -101,6 +103,7 @@ class BendingTest:
     plastic_rate: float = 0.0
     law_stays: bool = False
     set_threshold: float = 0.0
+    set_saturation: float = 0.0
     grown: Array | None = None
     zero: Zero | float = "natural"
     displacement_offset: float = 0.0
@@ -127,7 +130,7 @@ class BendingTest:
         K0 = joint_values(self.pre_curvature, elements, name="pre_curvature")
         given = self.stiffness_profile
         profile = None if given is None else joint_values(given, elements, name="stiffness_profile")
-        grows = self.plastic_rate, self.law_stays, self.set_threshold, self.grown
+        grows = self.plastic_rate, self.law_stays, self.set_threshold, self.set_saturation, self.grown
         section = Section(self.characteristic, K0, profile, self.friction, *grows)
         return Rod(
             self.length, elements, section, self.left, self.right, self.load, self.axial_stiffness, self.shear_stiffness
@@ -172,6 +175,7 @@ class BendingTest:
         found["rig_stiffening"] = self.stiffening
         found |= {"load_x": self.load[0], "load_y": self.load[1], "length": self.length}
         found |= {"plastic_set": self.plastic_rate, "set_threshold": self.set_threshold}
+        found["set_saturation"] = self.set_saturation
         for side, end in (("left", self.left), ("right", self.right)):
             found |= {f"end_moment_{side}": end.moment, f"clamp_angle_{side}": end.angle or 0.0}
             found |= {f"bearing_stiffness_{side}": end.stiffness, f"bearing_friction_{side}": end.friction_moment}

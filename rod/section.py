@@ -8,8 +8,9 @@ From curvature K (1/m) at the joints of the discrete rod to moment m (N m) and t
   curvature change c_e and slips at the moment M_e; z_e is its relaxed curvature, its memory. At the start z_e = K0.
 * An element that gives way gradually (Dahl): from K', where the step before ended, q_e = w - (w - q_e') exp(-|K - K'| /
   c_e), w the sign of K - K'. With z_e = K - c_e q_e its memory is one and the same.
-* Plastic set p = rate * (max(reached, K - K0) - threshold), where ``reached`` is the largest excess K - K0 so far, the
-  threshold at least: the cable is free of moment at K0 + p. The law m_law(K, K0) moves along with its rest,
+* Plastic set p = rate * g(max(reached, K - K0) - threshold), where ``reached`` is the largest excess K - K0 so far, the
+  threshold at least, and g(x) = (1 - exp(-c x)) / c of saturation c grows ever more slowly, g(x) = x without one: the
+  cable is free of moment at K0 + p. The law m_law(K, K0) moves along with its rest,
   m_law(K - p, K0), as that of a cable that has been bent to another shape; or it stays at its curvature
   (``law_stays``), m_law(K, K0) - m_law(K0 + p, K0), as that of a cable whose stiffness belongs to the shape it has. For
   a law of constant stiffness both are the same.
@@ -168,6 +169,8 @@ class Section:
         Whether the law stays at its curvature while K0 grows.
     set_threshold : 1/m
         Bend from rest beyond which a set begins.
+    set_saturation : m
+        One over the bend beyond that on which the growth of a set falls to 37 %; zero where it does not fall.
     grown : (steps, n) 1/m or None
         Set that is given step by step; the last one stays.
     """
@@ -179,6 +182,7 @@ class Section:
     plastic_rate: float = 0.0
     law_stays: bool = False
     set_threshold: float = 0.0
+    set_saturation: float = 0.0
     grown: Array | None = None
 
     @property
@@ -204,8 +208,11 @@ class Section:
 
     def set_at(self, K: Array, memory: Memory) -> Array:
         """Plastic set p that goes with curvature K, (n,) 1/m."""
-        largest = np.maximum(memory.reached, K - self.pre_curvature)
-        return np.asarray(self.plastic_rate * (largest - self.set_threshold) + self.given(memory))
+        return np.asarray(self.grows(np.maximum(memory.reached, K - self.pre_curvature)) + self.given(memory))
+
+    def grows(self, reached: Array) -> Array:
+        """Plastic set by the largest excess so far, the threshold at least, (n,) 1/m."""
+        return self.plastic_rate * growth(reached - self.set_threshold, self.set_saturation)[0]
 
     def read(self, K: Array, p: Array) -> tuple[Read, ...]:
         """Where the law is read for curvature K and set p: its moment is ``sum share * law.moment(at, K0)``."""
@@ -231,7 +238,8 @@ class Section:
         elastic, K0 = _elastic(self), self.pre_curvature
 
         def with_set(K: Array) -> tuple[Array, Array]:
-            growing = self.plastic_rate * np.greater(K - K0, memory.reached)
+            slope = growth(K - K0 - self.set_threshold, self.set_saturation)[1]
+            growing = self.plastic_rate * slope * np.greater(K - K0, memory.reached)
             m, tangent = np.zeros((2, *K.shape))
             for read in self.read(K, self.set_at(K, memory)):
                 moment, by_read = elastic(read.at)
@@ -247,6 +255,15 @@ class Section:
         if self.friction is None:
             return memory.relaxed, K, reached
         return K - self.friction.stick * self.friction.share(K, memory)[0], K, reached
+
+
+def growth(excess: Array, saturation: float) -> tuple[Array, Array, Array]:
+    """What a set grows by a bend of ``excess`` (n,) 1/m beyond its threshold, g; its derivatives by that and by c."""
+    if not saturation:
+        return excess, np.ones_like(excess), -0.5 * excess**2
+    g = -np.expm1(-saturation * excess) / saturation
+    left = 1.0 - saturation * g
+    return g, left, (excess * left - g) / saturation
 
 
 @lru_cache(maxsize=16)

@@ -28,7 +28,7 @@ from rod.characteristic import Array, parametric
 from rod.equilibrium import Equilibrium
 from rod.parameters import Directions, Parameter, directions
 from rod.reduction import Balance, EdgeState, System
-from rod.section import InternalFriction, Read
+from rod.section import InternalFriction, Read, growth
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +223,9 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
         excess = np.maximum(memory.reached, K - K0) - section.set_threshold
         grown = np.where(np.greater(K - K0, memory.reached), -move, past.reached)
         grown = grown - moves.scalar("set_threshold")[:, None]
-        set_move = section.plastic_rate * grown + moves.scalar("plastic_set")[:, None] * excess
+        g, by_excess, by_saturation = growth(excess, section.set_saturation)
+        grown = by_excess * grown + by_saturation * moves.scalar("set_saturation")[:, None]
+        set_move = section.plastic_rate * grown + moves.scalar("plastic_set")[:, None] * g
         if moves.grown:
             set_move = set_move + moves.given(moves.grown, memory.step)
         reads = section.read(K, section.set_at(K, memory))

@@ -200,7 +200,16 @@ def test_set_is_named_whether_its_law_moves_along_or_stays(law_stays):
     part = present(bench, conclude(bench), SETTINGS)
     assert part.verdict == "named" and part.causes[0].name == "plastic_set", part.headline
     assert part.causes[0].estimate == pytest.approx(0.08, abs=4.0 * part.causes[0].std)
-    assert [form.at > 0.5 for form in part.causes[0].forms] == [law_stays]
+    assert [form.label == "with a law that stays" for form in part.causes[0].forms] == [law_stays]
+    assert f_error(part.extended, cable)[0] < 0.02
+
+
+@pytest.mark.parametrize("everywhere", [False, True])
+def test_set_that_slows_down_is_no_second_cause_and_no_other(everywhere):
+    """Grown as x / (1 + c x / 2), which is not the form that is fitted; f_EI in proportion to x is another by 7 %."""
+    cable = Cable(set_rate=0.25, set_from=0.5, set_saturation=0.6, set_profile=np.ones_like if everywhere else None)
+    part, _, _ = diagnose(faults_of_input(hidden_test(cable, LOOP, largest=LARGEST, seed=17)), None, SETTINGS)
+    assert part.verdict == "named" and part.causes[0].name == "plastic_set", part.headline
     assert f_error(part.extended, cable)[0] < 0.02
 
 

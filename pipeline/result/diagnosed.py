@@ -61,7 +61,8 @@ class CausePart(Part):
         for form in self.forms:
             message = Message(f"form.{self.name}.{form.label}", at=form.at, width=form.width)
             if message.key in known:
-                said.append(message.parts(language)[-1 if form.tuned else 0])
+                parts = message.parts(language)  # the more was fitted, the more is told
+                said.append(parts[min(len(form.tuned), len(parts) - 1)])
         return list(dict.fromkeys(said))
 
 

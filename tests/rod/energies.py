@@ -36,7 +36,7 @@ def section_stored(section, K, memory):
 def section_potential(section, K, memory):
     # up to the curvature reached before, the set stays; beyond, it grows
     turn = np.minimum(K, section.pre_curvature + memory.reached) if section.plastic_rate else K
-    before = section.plastic_rate * (memory.reached - section.set_threshold) + section.given(memory)
+    before = section.grows(memory.reached) + section.given(memory)
     energy = _of_law(section, turn, np.broadcast_to(before, K.shape))
     if section.plastic_rate:
         k = turn + (K - turn) * POINTS

@@ -175,6 +175,7 @@ FRICTIONAL = {
     "bearing friction": {"left": Support(friction_moment=6e-4), "right": Support(friction_moment=3e-4)},
     "plastic set": {"plastic_rate": 0.1},
     "plastic set beyond a threshold": {"plastic_rate": 0.1, "set_threshold": 1.5},
+    "plastic set that slows down": {"plastic_rate": 0.1, "set_threshold": 0.5, "set_saturation": 0.4},
     "plastic set beside a law that stays": {"plastic_rate": 0.1, "law_stays": True},
 }
 

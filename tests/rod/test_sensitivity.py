@@ -94,6 +94,7 @@ VARIATIONS: dict[str, tuple[Vary, float]] = {
     ),
     "plastic_set": (lambda t, h: replace(t, plastic_rate=t.plastic_rate + h), 3e-5),
     "set_threshold": (lambda t, h: replace(t, set_threshold=t.set_threshold + h), 3e-4),
+    "set_saturation": (lambda t, h: replace(t, set_saturation=t.set_saturation + h), 3e-4),
 }
 
 
@@ -221,6 +222,13 @@ def test_set_beside_a_law_that_stays(name: str, abscissa: str) -> None:
     vary, h = VARIATIONS[name]
     assert worst_error(test, parameter(name, test), vary, h, displaced) < 1e-6
     assert worst_error(test, "ordinates", control_point(1), 3e-7, displaced, column=1) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["pre_curvature[0]", "plastic_set", "set_threshold", "set_saturation"])
+def test_set_that_slows_down(name: str) -> None:
+    test = replace(EVERYTHING, set_saturation=0.3)
+    vary, h = VARIATIONS[name]
+    assert worst_error(test, parameter(name, test), vary, h, displaced) < 1e-6
 
 
 CAUSES = ("bearing_stiffness", "bearing_friction", "rigid_ends", "load_x", "load_y", "hysteresis", "plastic_set")

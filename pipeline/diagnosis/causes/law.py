@@ -3,7 +3,8 @@
 nonlinear_stiffness  the law of the base model may have any form; a cause in the paper's own two steps alone
 hysteresis           elements beside the law that slip, at once or gradually (see `rod.section.InternalFriction`)
 plastic_set          K0 grows with the largest curvature reached, where it was reached; the law moves along or stays
-                     (see `rod.section`); or all along the cable, alike or in a half sine, with the largest of all
+                     (see `rod.section`); or all along the cable, alike or in a half sine, with the largest of all;
+                     in proportion, beyond a threshold (``width``), or ever more slowly (``at``, its saturation)
 stiffness_drift      all moments are multiplied by 1 + a g(step), g from 0 at the first step to n - 1 at the last
 
 Where nothing but the cable resists, moments multiplied alike multiply the force and leave the shapes as they were.
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes.load_cell import SETTLING, passed
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model, Prediction
-from rod.section import InternalFriction
+from rod.section import InternalFriction, growth
 
 Array = NDArray[np.float64]
 
@@ -101,7 +102,7 @@ FORMS = (
     "alike all along the cable",
     "in a half sine along the cable",
 )
-"""How K0 grows: where the cable bends, by ``at`` 0 and 1; or by the largest bend anywhere."""
+"""How K0 grows: where the cable bends, the first two; or with the largest bend anywhere."""
 
 
 class PlasticSet(Cause):
@@ -121,26 +122,34 @@ class PlasticSet(Cause):
         """Where the cable bends, the law moving along with the new rest or not; or all along with the largest bend.
 
         From the first bend on, or beyond ``width``, sought from a low one and from a high one: with every step that a
-        threshold passes the misfit has another valley. On loading alone a set where the cable bends is part of the law.
+        threshold passes the misfit has another valley. What saturates may have a threshold too. On loading alone a set
+        where the cable bends is part of the law.
         """
         reach = 0.9 * facts.curvature_scale
-        late = [Variant(width=share * reach, tuned=("width",), width_range=(0.0, reach)) for share in (0.2, 0.5)]
+        plain = Variant(at_range=(0.0, MOST_SATURATED / reach), width_range=(0.0, reach))
+        late = [replace(plain, width=share * reach, tuned=("width",)) for share in (0.2, 0.5)]
+        slows = replace(plain, at=1.0 / reach, tuned=("at", "width"))
         return tuple(
-            replace(form, label=FORMS[at], at=float(at), of_law=at < 2 and not facts.returns)
-            for at in range(len(FORMS) if len(facts.bends) else 2)
-            for form in (Variant(), *late)
+            replace(form, label=label, of_law=label in FORMS[:2] and not facts.returns)
+            for label in (FORMS if len(facts.bends) else FORMS[:2])
+            for form in (plain, *late, slows)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let ``amount`` of the largest excess curvature beyond the threshold stay."""
-        threshold = max(variant.width, 0.0)
-        if variant.at > 1.5 and len(facts.bends):
-            bends = amount * np.maximum(facts.bends - threshold, 0.0)
+        threshold, saturation = max(variant.width, 0.0), max(variant.at, 0.0)
+        form = FORMS.index(variant.label)
+        if form > 1 and len(facts.bends):
+            bends = amount * growth(np.maximum(facts.bends - threshold, 0.0), saturation)[0]
             at = np.concatenate(([0.0], np.cumsum(model.bending.rod.elements)))
-            along = np.ones_like(at) if variant.at < 2.5 else np.sin(np.pi * at)
+            along = np.ones_like(at) if form == 2 else np.sin(np.pi * at)
             return replace(model, bending=replace(model.bending, grown=np.outer(bends, along)))
-        grows = replace(model.bending, plastic_rate=amount, law_stays=variant.at > 0.5, set_threshold=threshold)
-        return replace(model, bending=grows)
+        grows = replace(model.bending, plastic_rate=amount, law_stays=form == 1, set_threshold=threshold)
+        return replace(model, bending=replace(grows, set_saturation=saturation))
+
+
+MOST_SATURATED = 10.0
+"""Saturation (see `rod.section`) times the reach of the bends up to which it is sought: growth is over in a tenth."""
 
 
 class StiffnessDrift(Cause):
