@@ -128,7 +128,7 @@ class PlasticSet(Cause):
         reach = 0.9 * facts.curvature_scale
         plain = Variant(at_range=(0.0, MOST_SATURATED / reach), width_range=(0.0, reach))
         late = [replace(plain, width=share * reach, tuned=("width",)) for share in (0.2, 0.5)]
-        slows = replace(plain, at=1.0 / reach, tuned=("at", "width"))
+        slows = replace(plain, at=1.0 / reach, width=0.1 * reach, tuned=("at", "width"))
         return tuple(
             replace(form, label=label, of_law=label in FORMS[:2] and not facts.returns)
             for label in (FORMS if len(facts.bends) else FORMS[:2])
