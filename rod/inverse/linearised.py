@@ -72,22 +72,21 @@ def _forces(observation: Observation, at: Prediction, moved: Prediction) -> list
 def _across(observation: Observation, at: Prediction) -> tuple[Array, Array, tuple[_Nodes, _Nodes]]:
     """Sine and cosine (k,) of the curve at the foot points, and its two nodes beside each.
 
-    The curve is that of `observation.foot_points`: a Hermite cubic of x, y and theta.
+    The curve is that of `observation.foot_points`: a Hermite cubic of x, y and theta, whose own direction is not quite
+    the one between those of its nodes. What it moves along itself changes no distance.
     """
     foot = foot_points(observation.all_sections, at)
-    sine, cosine = np.sin(foot.direction), np.cos(foot.direction)
-    t, width = foot.t, foot.width
+    t, width, step, left, right = foot.t, foot.width, observation.all_sections.step, foot.left, foot.left + 1
     rest = 1.0 - t
     h1, h2, h3 = t * t * (3.0 - 2.0 * t), t * rest * rest, -t * t * rest
-    step, left, right = observation.all_sections.step, foot.left, foot.left + 1
+    by_h1, by_h2, by_h3 = 6.0 * t * rest / width, rest * (1.0 - 3.0 * t), -t * (2.0 - 3.0 * t)
     a, b = at.theta[step, left], at.theta[step, right]
-    # across the curve: of a unit vector at the angle a its sine of (a - direction), of its turn the cosine
-    over_a, over_b = np.sin(a - foot.direction), np.sin(b - foot.direction)
-    span = cosine * (at.y[step, right] - at.y[step, left]) - sine * (at.x[step, right] - at.x[step, left])
-    by_t = span * 6.0 * t * rest + width * (over_a * rest * (1.0 - 3.0 * t) - over_b * t * (2.0 - 3.0 * t))
-    by_width = over_a * h2 + over_b * h3
+    up = by_h1 * (at.y[step, right] - at.y[step, left]) + by_h2 * np.sin(a) + by_h3 * np.sin(b)
+    ahead = by_h1 * (at.x[step, right] - at.x[step, left]) + by_h2 * np.cos(a) + by_h3 * np.cos(b)
+    direction = np.arctan2(up, ahead)
+    by_width = h2 * np.sin(a - direction) + h3 * np.sin(b - direction)
     nodes = (
-        _Nodes(left, 1.0 - h1, width * h2 * np.cos(a - foot.direction), -by_t * rest / width - by_width),
-        _Nodes(right, h1, width * h3 * np.cos(b - foot.direction), -by_t * t / width + by_width),
+        _Nodes(left, 1.0 - h1, width * h2 * np.cos(a - direction), -by_width),
+        _Nodes(right, h1, width * h3 * np.cos(b - direction), by_width),
     )
-    return sine, cosine, nodes
+    return np.sin(direction), np.cos(direction), nodes

@@ -10,7 +10,7 @@ from fixtures.trials import f_error
 from pipeline.diagnosis.diagnose import diagnose
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.inverse.force_noise import force_noise
+from rod.inverse.force_noise import SPREADS, force_noise
 from rod.inverse.noise import (
     calibrate_photo_noise,
     section_covariance,
@@ -138,6 +138,20 @@ def test_levels_of_their_own_are_drawn_to_each_other_and_known_badly():
         scores += [2.0 * stats.t.sf(abs(z), own) for z, own in zip(means, level.own, strict=True)]
     # 1,400 holds: one in a hundred is known to 0.3 %, and seven holds do not tell their spread well
     assert np.mean(np.array(scores) < 0.01) == pytest.approx(0.01, abs=0.005)
+
+
+@pytest.mark.parametrize("levels", [(1.0, 1.5, 0.8, 1.2, 30.0), (1.0, 10.0, 0.1, 3.0, 30.0)])
+def test_levels_of_their_own_are_the_mean_over_the_likelihood_of_their_spread(levels):
+    """Smyth 2004: a hold's variance over the common level follows F, here by its density in scipy."""
+    forces = np.array(levels)[:, None] * np.random.default_rng(8).standard_normal((len(levels), 6))
+    found = force_noise(holds(forces), floor=0.0, distinct=1e-3)
+    f, times = 4, np.arange(6.0)
+    own = np.array([np.polyfit(times, samples, 1, full=True)[1][0] / f for samples in forces])
+    level, spread = (table.ravel() for table in np.meshgrid(np.geomspace(own.min(), own.max(), 31), SPREADS))
+    weight = np.prod([stats.f.pdf(one / level, f, spread) / level for one in own], axis=0)
+    drawn = (spread * level + f * own[:, None]) / (spread + f)
+    assert found.std**2 == pytest.approx(drawn @ weight / weight.sum(), rel=1e-9)
+    assert found.own == pytest.approx([weight.sum() / (weight @ (1.0 / (spread + f)))] * len(levels), rel=1e-9)
 
 
 def test_samples_that_repeat_in_all_digits_are_no_quiet_hold():

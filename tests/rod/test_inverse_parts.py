@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rod.bending_test import BendingTest
 from rod.compliance_law import moment_basis
 from rod.inverse import estimate
+from rod.inverse.base import start
 from rod.inverse.base_fit import base_fit
 from rod.inverse.laws import SOFTER, AnyLaw
-from rod.inverse.prediction import facts_of
+from rod.inverse.prediction import Model, facts_of
+from rod.inverse.simulation import freedom, run
 from rod.midline import block_covariance, midline
 from tests.rod.virtual_cable import StickSlip, force_free
 from tests.rod.virtual_photo import Camera, bending_test
@@ -55,6 +58,34 @@ def test_no_prediction_where_no_equilibrium_exists():
     pulled = tuple(replace(step, displacement=-0.1 * LENGTH) for step in test.steps)  # beyond the cable's length
     longer = replace(test, steps=pulled)
     assert base_fit(longer, facts_of(longer)).fitted.run.prediction is None
+
+
+@pytest.mark.parametrize(("error", "K0", "free"), [(-5e-4, 0.0, True), (-1e-3, 2.0, False)])
+def test_a_mounted_cable_is_free_where_log_and_error_of_its_zero_cancel(error, K0, free):
+    """There a straight one has no force, though no chord of it can be imposed; a bent one beyond is pulled."""
+    facts = replace(facts_of(measured()), branch=("mounted",), displacement=np.array([5e-4]), hold_times=(np.zeros(1),))
+    model = Model(BendingTest(LENGTH, 5e-3, K0), shift=np.array([error]))
+    assert freedom(model, facts) == [([0], free)]
+    (force,) = run(model, facts).prediction.force
+    assert force == 0.0 if free else force < 0.0
+
+
+def test_a_step_that_no_log_states_begins_where_its_photo_shows_it():
+    test = measured()
+    steps = tuple(replace(step, displacement=None) for step in test.steps[1:])
+    unlogged = replace(test, steps=steps)
+    facts = facts_of(unlogged)
+    base = start(unlogged, facts, begin=(LAW.EI0, LAW.K0))
+    first = run(base.model(base.neutral(), steps=len(steps)), facts).prediction
+    assert first.chord == pytest.approx([step.chord for step in steps], abs=1e-6)
+
+
+def test_an_error_of_the_stated_length_is_told_in_metres():
+    test = measured()
+    found, std, before = estimate(replace(test, length=LENGTH - 1e-3, length_std=1e-3)).nuisances["length"]
+    assert before == pytest.approx(1e-3)
+    assert std < 0.1 * before
+    assert found == pytest.approx(1e-3, abs=3.0 * std)
 
 
 def test_block_covariance_is_that_of_the_means():
