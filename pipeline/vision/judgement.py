@@ -1,6 +1,6 @@
 """One strip of the photo: is it the cable? Its cross-cuts, its course, its ends and bearings, its figures.
 
-``strip -> contrast -> crossings -> bearing axes -> cross-cuts up to the axes -> width -> blur -> RoughCable``
+``strip -> contrast -> crossings -> bearing axes -> cross-cuts up to the axes -> width -> RoughCable``
 
 The checks run from what misleads most to what misleads least; each refusal says the figure that shows why.
 """
@@ -44,8 +44,6 @@ from pipeline.vision.search.strips import Strip
 
 _LEAST_SLENDERNESS = 10.0  # widths; a shorter strip of unknown width is a fold or a thing: no rod bends on ten
 _LEAST_BEFORE_COVER = 1.0  # widths; a shorter piece of cable between a band across it and a cover shows no direction
-_MOVED = 0.25  # widths; from 0.28 on midlines were off by more than their bands
-_LEAST_MOTION = 4.0  # px; on still webcam photos of cables 6 to 10 px wide the spreads of edges tell 2 px
 _BLURRED = 0.1  # widths; with more blur that, and no missing cover, is why no axis was found
 _ACCEPTED_WIDTH_RATIO = (0.65, 1.35)  # ratio of the edges' distance to the diameter; a sheath may be dark at its flanks
 
@@ -150,17 +148,9 @@ def _unsharp(photo: Photo, standout: Standout, cut: CrossCut) -> Rejected | None
     """Say of a photo whose covers were not found that its edges are blurred, where they are."""
     width = cut.usual_width * standout.reduction
     closeup = take_closeup(photo, standout.to_pixels(cut.path), width, cut.weights)
-    moved = _moved(photo, closeup, width)
-    if moved is not None or closeup.blur_px <= _BLURRED * width:
-        return moved
-    return refused(photo, "photo/blur", blur_px=closeup.blur_px, width_px=width)
-
-
-def _moved(photo: Photo, closeup: Closeup, width: float) -> Rejected | None:
-    """Refuse a photo taken in motion: covers are doubled, and shading is smeared over the edges."""
-    if closeup.motion_px <= max(_MOVED * width, _LEAST_MOTION * photo.grid_px):
+    if closeup.softest_px <= _BLURRED * width:
         return None
-    return refused(photo, "photo/blur.moved", motion_px=closeup.motion_px, width_px=width)
+    return refused(photo, "photo/blur", blur_px=closeup.softest_px, width_px=width)
 
 
 def _axes(
@@ -207,9 +197,6 @@ def _assemble(
     path, visible = between_axes(path, axes, COVER_MARGIN_WIDTHS * width)
     if visible is None:
         return refused(photo, "photo/bearing.nothing")
-    moved = _moved(photo, closeup, width)
-    if moved is not None:
-        return moved
     return RoughCable(
         image=photo.name,
         path_px=path,

@@ -202,9 +202,6 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     for _, refusal, path in refusals:
         # other readings of a photo that shows a crossing, or the cable cut, may show one arm of it as a clean strip
         length = float(step_lengths(path).sum())
-        # blur is judged last: a strip refused for it looks like a cable in all else
-        if refusal.code == "photo/blur" and length > _RIVAL * best.length_px and not _lies_on(best, [path]):
-            return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=length)
         longer = length > best.length_px and _length_beyond(path, best) > 2.0 * LEAST_MORE_WIDTHS * best.half_width_px
         if longer and refusal.code in ("photo/crossing", "photo/hidden-end"):
             return refusal

@@ -206,8 +206,12 @@ def _measure_all(
 
     def sides(cables: Sequence[Followed | Rejected]) -> tuple[bool, tuple[Finding, ...], float]:
         found, _ = _told_by(shots, cables)
-        turned, findings = _name_sides(specimen, found, calibration, settings)
-        return turned, findings, wandering_px(found, calibration.scale.px_per_m, settings.series)
+        turned, findings = _name_sides(specimen, found, calibration)
+        fixed, wandering, shift = wandering_px(found, settings.series.max_fixed_shift_m * calibration.scale.px_per_m)
+        if wandering > 0.0:
+            moved = doubtful("photo/camera-moved", side=fixed, shift_m=shift / calibration.scale.px_per_m)
+            findings = (*findings, moved)
+        return turned, findings, wandering
 
     cables, told = jointly([shot.found.image for shot in shots], [follow(shot.found) for shot in shots], sides)
     turned, findings, wandering = told or (False, (_UNTOLD,), 0.0)
@@ -259,7 +263,7 @@ def _doubted(line: Centerline | Rejected, calibration: Calibration) -> Centerlin
 
 
 def _name_sides(
-    specimen: Specimen, found: list[RoughCable], calibration: Calibration, settings: VisionSettings
+    specimen: Specimen, found: list[RoughCable], calibration: Calibration
 ) -> tuple[bool, tuple[Finding, ...]]:
     """Which axis moves over the series; where the chord stands upright, that decides which one is called left.
 
@@ -270,29 +274,14 @@ def _name_sides(
         return False, ()
     steps = np.hypot(*np.ptp(axes, axis=0).T)  # (2,) px: how far the left and the right axis went
     least = _MIN_TRAVEL_M * float(calibration.scale.px_per_m)
-    if steps.max() < max(least, 4.0 * max(cable.left.std_px for cable in found)):
-        return False, ()
     moving = "left" if steps[0] > steps[1] else "right"
-    findings = []
-    if moving != specimen.rig.moving_bearing:
-        du, dv = np.abs(np.median(axes[:, 1] - axes[:, 0], axis=0))
-        if du <= np.tan(np.radians(VERTICAL_DEG)) * dv:
-            return True, _fixed_moved(steps, moving, found, calibration, settings.series)
-        findings.append(doubtful("rig/moving-bearing", moving=moving, stated=specimen.rig.moving_bearing))
-    return False, (*findings, *_fixed_moved(steps, moving, found, calibration, settings.series))
-
-
-def _fixed_moved(
-    steps: Array, moving: str, found: list[RoughCable], calibration: Calibration, settings: SeriesSettings
-) -> tuple[Finding, ...]:
-    other = "right" if moving == "left" else "left"
-    axes = [cable.right if other == "right" else cable.left for cable in found]
-    shift = float(steps.min()) / calibration.scale.px_per_m
-    # Both coordinates of an axis spread over three standard deviations among eight photos, over four hardly ever.
-    doubt = 4.0 * np.sqrt(2.0) * float(np.median([axis.std_px for axis in axes])) / calibration.scale.px_per_m
-    if shift <= max(settings.max_fixed_shift_m, doubt):
-        return ()
-    return (doubtful("photo/camera-moved", side=other, shift_m=shift),)
+    small = steps.max() < max(least, 4.0 * max(cable.left.std_px for cable in found))
+    if small or moving == specimen.rig.moving_bearing:
+        return False, ()
+    du, dv = np.abs(np.median(axes[:, 1] - axes[:, 0], axis=0))
+    if du <= np.tan(np.radians(VERTICAL_DEG)) * dv:
+        return True, ()
+    return False, (doubtful("rig/moving-bearing", moving=moving, stated=specimen.rig.moving_bearing),)
 
 
 def _reversed(found: RoughCable | Rejected) -> RoughCable | Rejected:

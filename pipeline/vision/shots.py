@@ -21,6 +21,7 @@ from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.bearings.rim import SAME_RADIUS
 from pipeline.vision.bearings.steady import (
     apart_px,
+    doubted,
     expected_covers,
     fixed_cover,
     is_sure,
@@ -241,7 +242,8 @@ def with_fixed_cover(
 ) -> list[Shot]:
     """Photos on which something else was taken for the fixed bearing's cover: searched again where it stands.
 
-    A photo that shows it in neither place is refused, unless what was found is a cover all round: the camera moved.
+    A photo that shows it in neither place is refused, unless what was found is a cover all round: the camera moved, or
+    it is the cover of another thing, which the cable passes beside.
     """
     there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
     found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
@@ -262,6 +264,8 @@ def with_fixed_cover(
             apart = apart_px(cable, fixed) / scale
             said = Message("photo/bearing.astray", side=fixed.side, apart_m=apart)
             settled[k] = replace(shots[k], found=Rejected(cable.image, said))
+        else:
+            settled[k] = replace(shots[k], found=doubted(cable, fixed.side))
     return settled
 
 

@@ -11,10 +11,9 @@ import pytest
 
 from pipeline.records import Centerline
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.render import render
 from pipeline.vision.scale.plane import PlaneMap
-from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, rough_cable
+from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, measure_centerline, rough_cable
 
 
 @pytest.mark.parametrize(

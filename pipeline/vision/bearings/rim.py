@@ -294,17 +294,4 @@ def _robust_circle(
     lag = min(max(lag, 0.0), 0.95)
     inflation = (1.0 + lag) / (1.0 - lag)
     covariance = np.linalg.inv(normal) * spread**2 * inflation
-    covariance += _unevenness(design[:2], residual, tukey) * np.eye(3)
     return fit, covariance
-
-
-def _unevenness(direction: Array, residual: Array, weight: Array) -> float:
-    """Variance (px^2) of each coordinate of the centre, and of the radius, by light and looks that differ around it.
-
-    They move edges by smooth functions of the direction. The part once around passes for a shift of the centre; those
-    two and three times around are seen, and are about as large.
-    """
-    angle = np.arctan2(direction[1], direction[0])
-    waves = np.column_stack([wave(n * angle) for n in (2, 3) for wave in (np.cos, np.sin)])
-    normal = waves.T @ (weight[:, None] * waves) + 0.05 * weight.sum() * np.eye(4)
-    return float(np.mean(np.linalg.solve(normal, waves.T @ (weight * residual)) ** 2))

@@ -31,11 +31,6 @@ MARK_CELLS = 12.0  # cells; a mark's largest radius in the picture it is searche
 SAME_AXIS_RADII = 0.03  # radii; a ring farther off was not turned on the axis: a sticker, a hole beside it
 _MARK_TRIES = 4  # roundest places where a mark is fitted: edges of cover and shadow pass for round ones
 _ASTRAY_RADII = 0.16  # radii; how far a rim that is not sure may lie off the centre: half a bevel
-_SURE_CENTER_RADII = 0.004  # radii; a centre with a wider std is not sure: shadow or bevel took part of the rim
-_CERTAIN_CENTER_PX = 0.05
-"""Px; a rim seen all round that tells its centre so well needs no rings: 0.01 mm at 5 px/mm, less than the play of a
-bearing.
-"""
 _RING_RANGE = (0.1, 0.96)  # radii; where dots, grooves and bevels lie: below is a punch mark, above the rim
 _RINGS = 2  # rings of a cover that are fitted at most: the strongest tell the most
 
@@ -53,15 +48,11 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
     Returns
     -------
     Circle
-        As it was where no ring is seen, or the rim leaves no doubt. A rim that is not seen all round, or lies
+        As it was where no ring is seen. A rim that is not seen all round, or lies
         elsewhere, yields to the rings; else all are averaged by their variances, which are widened to what they differ.
     """
-    whole, center = rim.rim >= SURE_RIM, np.array(rim.center)
-    if whole and rim.std < _CERTAIN_CENTER_PX:
-        return rim
-    if not (whole and rim.std < _SURE_CENTER_RADII * expected.px):
-        center = _roundest(photo, center, expected.px)
-    rings = _rings(photo, center, expected.px)
+    whole = rim.rim >= SURE_RIM
+    rings = _rings(photo, _roundest(photo, np.array(rim.center), expected.px), expected.px)
     if not rings:
         return rim
     apart = max(np.hypot(*np.subtract(ring.center, rim.center)) for ring in rings)

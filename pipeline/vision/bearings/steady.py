@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.records import Array, Side
-from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.scale.plane import PlaneMap
 
@@ -86,15 +85,19 @@ def fixed_cover(found: Sequence[RoughCable], play_px: float) -> Fixed | None:
     return Fixed(_SIDES[side], cover, tuple(int(k) for k in np.flatnonzero(~steady[side])))
 
 
-def wandering_px(found: Sequence[RoughCable], px_per_m: float, settings: SeriesSettings) -> float:
-    """What the fixed axis wanders beyond its play, rms of a coordinate; 0 if it stands still."""
-    axes = np.array([[cable.left.center_px, cable.right.center_px] for cable in found])
-    if len(found) < 2 or any(cable.left.kind == "given" for cable in found):
-        return 0.0
-    steps = np.hypot(*np.ptp(axes, axis=0).T)
-    if float(steps.min()) <= settings.max_fixed_shift_m * px_per_m:
-        return 0.0
-    return float(np.sqrt(np.mean(np.var(axes[:, int(np.argmin(steps))], axis=0))))
+def wandering_px(found: Sequence[RoughCable], play_px: float) -> tuple[Side, float, float]:
+    """Which axis is fixed, what it wanders beyond its play and errors, rms of a coordinate, and how far it went.
+
+    Zero if it stands still.
+    """
+    if len(found) < 2:
+        return "left", 0.0, 0.0
+    went = [float(np.hypot(*np.ptp(_places(found, side), axis=0))) for side in _SIDES]
+    side = _SIDES[int(np.argmin(went))]
+    given = any(cable.left.kind == "given" for cable in found)
+    if given or (_off_middle(found, side) <= _reach(found, side, play_px)).all():
+        return side, 0.0, 0.0
+    return side, float(np.sqrt(np.mean(np.var(_places(found, side), axis=0)))), min(went)
 
 
 def at_least(cable: RoughCable, std_px: float) -> RoughCable:
@@ -118,11 +121,22 @@ def is_sure(cable: RoughCable, side: Side) -> bool:
     return _axis(cable, side).sure
 
 
+def doubted(cable: RoughCable, side: Side) -> RoughCable:
+    """The cable with a cover on one side that may be another thing's."""
+    axis = replace(_axis(cable, side), sure=False)
+    return replace(cable, left=axis) if side == "left" else replace(cable, right=axis)
+
+
 _SIDES: tuple[Side, Side] = ("left", "right")
 
 
 def _axis(cable: RoughCable, side: Side) -> Bearing:
     return cable.left if side == "left" else cable.right
+
+
+def _places(found: Sequence[RoughCable], side: Side) -> Array:
+    """Axes ``(n, 2)`` px."""
+    return np.array([_axis(cable, side).center_px for cable in found])
 
 
 def _reach(found: Sequence[RoughCable], side: Side, play_px: float) -> Array:
@@ -132,5 +146,5 @@ def _reach(found: Sequence[RoughCable], side: Side, play_px: float) -> Array:
 
 def _off_middle(found: Sequence[RoughCable], side: Side) -> Array:
     """Distance of each photo's axis from the median of all."""
-    places = np.array([_axis(cable, side).center_px for cable in found])
+    places = _places(found, side)
     return np.asarray(np.hypot(*(places - np.median(places, axis=0)).T))

@@ -56,14 +56,6 @@ times the other's variance.
 """
 
 
-def measure_centerline(
-    rough: RoughCable, *, plane: PlaneMap, diameter_m: float | None, settings: VisionSettings
-) -> Centerline | Rejected:
-    """Centerline of the cable on a single photo in the chord frame, or why there is none; see `follow_cable`."""
-    followed = follow_cable(rough, plane=plane, diameter_m=diameter_m)
-    return followed if isinstance(followed, Rejected) else centerline_of(followed, settings)
-
-
 @dataclass(frozen=True)
 class Followed:
     """A cable fitted where its photo shows it, not yet tied to its axes.

@@ -53,7 +53,7 @@ _OUTSIDE_RADII = 0.18
 """Of the radius; part of the ground used for an edge: more brings more of the ground's texture (0.45 raised the error
 of kappa on brushed metal by half), less only more pixel noise.
 """
-_EDGE_WINDOW_BLURS = 2.5  # blurs; least part of sheath and ground on each side: beyond it the edge's tail is over
+EDGE_WINDOW_BLURS = 2.5  # blurs; least part of sheath and ground on each side: beyond it the edge's tail is over
 _WIDTH_DEPARTURE = 0.08
 """Relative; a stretch whose width is farther from the usual one is left out: a cable's is constant within 5 %."""
 _EDGE_OUTLIER = 6.0  # robust standard deviations from the neighbouring edges; the other edge takes over
@@ -103,6 +103,8 @@ class Sections:
         Of the sections asked for, those that were measured.
     contrast, noise, blur : float
         Median step and scatter of pixels, grey; median edge blur, px.
+    softest : px
+        Blur where it is most, of the sharper edge there: a shadow softens one edge, focus and motion both.
     asymmetry : float
         Relative difference of the two edges' contrast.
     """
@@ -118,6 +120,7 @@ class Sections:
     contrast: float
     noise: float
     blur: float
+    softest: float
     asymmetry: float
 
 
@@ -141,7 +144,7 @@ def measure_sections(
     """Sections at ``s`` of a path that follows the cable within a fraction of a pixel; None if hardly any is left."""
     inside = min(_INSIDE_RADII * half_width, _LONGEST_SIDE_PX)
     outside = min(_OUTSIDE_RADII * half_width, _LONGEST_SIDE_PX)
-    least = _EDGE_WINDOW_BLURS * blur + 0.5  # half a pixel for what the path may be off
+    least = EDGE_WINDOW_BLURS * blur + 0.5  # half a pixel for what the path may be off
     window = (max(inside, least), max(outside, least))
     rows = max(1, int(median(np.diff(s))))
     pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
@@ -184,6 +187,7 @@ def measure_sections(
         contrast=median(step),
         noise=median(profiles.noise),
         blur=median(profiles.blur),
+        softest=float(profiles.blur.min(axis=0).max()),
         asymmetry=_asymmetry(step),
     )
 

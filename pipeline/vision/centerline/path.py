@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,14 @@ from pipeline.records import Array, Rejected
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
 from pipeline.vision.centerline.edges import SEARCH_RADII, Ground, in_picture, search_edges
-from pipeline.vision.centerline.midline import LEAST_SECTIONS, Cover, Sections, free_of_covers, measure_sections
+from pipeline.vision.centerline.midline import (
+    EDGE_WINDOW_BLURS,
+    LEAST_SECTIONS,
+    Cover,
+    Sections,
+    free_of_covers,
+    measure_sections,
+)
 from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import Bearing, RoughCable
@@ -21,6 +29,7 @@ _WIDTH_TOLERANCE = 0.15  # relative; prior of the width in the search when the d
 _COVER_CHECK_RADII = 0.6
 """Of the radius; a section counts where it is free of covers that far out on both sides: inside the edges' windows."""
 _LEAST_SEEN_RADII = 10.0  # of the radius; a shorter seen piece is no measurement
+_SOFTER = 1.5  # ratio; edges so much softer than they were taken for reach beyond their windows by a tail of 5 %
 _SECTION_SPACING_DIAMETERS = 0.6
 """Diameters; sections closer than that tell the same of kappa, see knot_spacing_diameters."""
 _MIN_SECTIONS = 240  # of a short cable; fewer would average over bends, their errors are nearly independent
@@ -145,7 +154,12 @@ def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | R
     sections = measure_sections(
         ground, path, s, half_width=half_width, diameter=diameter if known else None, blur=rough.blur_px
     )
-    return _lost(rough, 0.0) if sections is None else sections
+    if sections is None:
+        return _lost(rough, 0.0)
+    softest = min(sections.softest, half_width / EDGE_WINDOW_BLURS)  # from there on one edge's window holds the other
+    if softest > _SOFTER * rough.blur_px:
+        return follow(replace(rough, blur_px=softest), half_width=0.5 * diameter, known=known)
+    return sections
 
 
 def _guides(rough: RoughCable, along: Array, half_width: float) -> tuple[Array, Array]:

@@ -20,7 +20,10 @@ from pipeline.vision.median import median, scatter
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import ChordFrame
 
-_WIDTH_OFF = 0.15  # relative; a strip split off along a highlight is 30 % too narrow, scales are known to some percent
+_WIDTH_OFF = 0.15
+"""Relative; a strip split off along a highlight is 30 % too narrow, scales are known to some percent. More by the blur,
+which moves edges by a part of itself.
+"""
 _BESIDE_COVER = 0.5  # radii; flanks, shadows and stripes pass a cover's axis by 0.85 and more, a cable by a tenth
 _UNEVEN_PX, _UNEVEN = 0.8, 0.025  # px and widths; scatter of middles about a smooth curve: shades on white 0.04 widths
 _BEND = 0.5  # curvature times diameter; on a radius of two diameters a cable kinks, a curve led astray bends
@@ -52,7 +55,7 @@ def refusal(
     middle = middle_width(width)[0]
     figure = evidence.figures | ({} if diameter is None else {"width_over_diameter": middle / diameter})
     told = (
-        _another_width(middle, diameter)
+        _another_width(middle, diameter, sections.softest * middle / median(sections.width))
         or (None if evidence.enough else unlike_a_cable(evidence))
         or _uneven(fit, sections, middle)
         or _beside_cover(rough, fit, chord, middle)
@@ -61,8 +64,8 @@ def refusal(
     return None if told is None else Rejected(rough.image, Message(told.key, **{**figure, **told.values}))
 
 
-def _another_width(middle: float, diameter: float | None) -> Message | None:
-    off = diameter is not None and abs(middle / diameter - 1.0) > _WIDTH_OFF
+def _another_width(middle: float, diameter: float | None, blur: float) -> Message | None:
+    off = diameter is not None and abs(middle - diameter) > _WIDTH_OFF * diameter + blur
     return Message("photo/width.traced") if off else None
 
 
@@ -75,8 +78,14 @@ def _uneven(fit: CurveFit, sections: Sections, middle: float) -> Message | None:
 
 
 def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: float) -> Message | None:
-    covers = np.array([bearing.radius_px is not None for bearing in (rough.left, rough.right)])
-    share = float((feet_of_axes(fit, chord)[1] / (0.5 * middle) * covers).max())
+    """A flank or a shadow, which runs beside the cable from end to end; or another thing taken for a cover.
+
+    One cover that is surely seen may be passed beside: not every cable runs through the axis of its bearing.
+    """
+    axes = (rough.left, rough.right)
+    radii = feet_of_axes(fit, chord)[1] / (0.5 * middle) * [axis.radius_px is not None for axis in axes]
+    doubted = [radius for radius, axis in zip(radii, axes, strict=True) if not axis.sure]
+    share = float(max(radii.min(), *doubted, 0.0))
     return None if share <= _BESIDE_COVER else Message("photo/bearing.beside-cover", radii=min(share, 99.0))
 
 

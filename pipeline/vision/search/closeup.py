@@ -33,17 +33,14 @@ class Closeup:
         Zero outside the corridor.
     origin_px : (u, v)
         Photo pixel of ``grey[0, 0]``.
-    blur_px : px
-        Standard deviation of the edge spread.
-    motion_px : px
-        How far camera or cable moved across the cable during the exposure, where that is most, beyond where it is
-        least; 0 where the edges are equally sharp everywhere.
+    blur_px, softest_px : px
+        Standard deviation of the edge spread: the median, and where it is most, of the sharper edge there.
     """
 
     grey: NDArray[np.float32]
     origin_px: tuple[int, int]
     blur_px: float
-    motion_px: float
+    softest_px: float
 
 
 def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) -> Closeup:
@@ -60,15 +57,8 @@ def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) 
             np.multiply(part, scaled[0], out=grey[rows, columns])
         else:
             cv2.transform(part.astype(np.float32), scaled[None, :], grey[rows, columns])
-    local = path_px - low
-    spreads, angles = _edge_spreads(grey, local, width_px)
-    seen = spreads[np.isfinite(spreads)]
-    return Closeup(
-        grey=grey,
-        origin_px=(int(low[0]), int(low[1])),
-        blur_px=median(seen) if len(seen) else 0.0,
-        motion_px=_motion(spreads, angles),
-    )
+    spreads = _edge_spreads(grey, path_px - low, width_px)
+    return Closeup(grey, (int(low[0]), int(low[1])), median(spreads), float(spreads.min(axis=0).max()))
 
 
 def _stretches(path: Array, margin: float, size: tuple[int, int]) -> list[tuple[slice, slice]]:
@@ -86,12 +76,12 @@ def _stretches(path: Array, margin: float, size: tuple[int, int]) -> list[tuple[
     ]
 
 
-def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple[Array, Array]:
-    """Edge spread ``(2, k)`` of both sides on groups of neighbouring sections, NaN without an edge, and angle ``(k,)``.
+def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> Array:
+    """Edge spread ``(2, k)`` of both sides on groups of neighbouring sections, 0 without an edge.
 
     A blurred step of height A has the slope ``A / (sqrt(2 pi) sigma)`` in its middle.
     """
-    tangent, normal = path_normals(path)
+    _, normal = path_normals(path)
     sections = np.linspace(0.1, 0.9, 8 * _GROUPS) * (len(path) - 1)
     centre = np.column_stack([np.interp(sections, np.arange(len(path)), column) for column in path.T])
     across = normal[np.rint(sections).astype(int)]
@@ -100,31 +90,11 @@ def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> tuple
     for side in (-0.5, 0.5):
         profile = sampled(grey, centre[:, None] + across[:, None] * (side * width + offsets)[:, None])
         spreads.append(_spread_of_groups(profile, offsets, outward=side > 0.0))
-    along = tangent[np.rint(sections).astype(int)].reshape(_GROUPS, -1, 2).mean(axis=1)
-    return np.array(spreads), np.arctan2(along[:, 1], along[:, 0])
-
-
-def _motion(spreads: Array, angles: Array) -> float:
-    """Length of a motion across the cable by the edge spreads ``(2, k)`` and the angles ``(k,)`` of the cable.
-
-    A motion over L in the direction mu adds ``L^2/12 sin^2(angle - mu)`` to the squared spread: nothing where the cable
-    runs along it. The sharper of both edges counts: a shadow softens one of them, a motion both. It is read off between
-    the angles that are seen: light on a round sheath changes the spread with the angle too, by little, and a course
-    that turns by a few degrees would make a long motion of it. Where the squared spread changes by less than half along
-    the cable, the cause is another one, or does the same as defocus.
-    """
-    sharper = np.min(spreads, axis=0)
-    known = np.isfinite(sharper)
-    if np.count_nonzero(known) < _GROUPS // 2:
-        return 0.0
-    squared, twice = sharper[known] ** 2, 2.0 * angles[known]
-    terms = np.column_stack([np.ones(len(twice)), np.cos(twice), np.sin(twice)])
-    smooth = terms @ np.linalg.lstsq(terms, squared, rcond=1e-3)[0]
-    return float(np.sqrt(12.0 * np.ptp(smooth))) if smooth.min() < 0.5 * smooth.max() else 0.0
+    return np.array(spreads)
 
 
 def _spread_of_groups(profile: NDArray[np.float32], offsets: Array, *, outward: bool) -> Array:
-    """Spread of one edge on each group of sections; NaN where the profile is flat. ``outward``: sheath first."""
+    """Spread of one edge on each group of sections; 0 where the profile is flat. ``outward``: sheath first."""
     spacing = float(offsets[1] - offsets[0])
     plateau = max(2, len(offsets) // 6)
     ends = np.stack([profile[:, :plateau].mean(axis=1), profile[:, -plateau:].mean(axis=1)])
@@ -147,7 +117,7 @@ def _spread_of_groups(profile: NDArray[np.float32], offsets: Array, *, outward: 
     rise = np.abs(lined[:, 2:] - lined[:, :-2])[:, plateau - 1 : 1 - plateau]
     slope = rise.max(axis=1, initial=0.0) / (2.0 * spacing)
     height = np.abs(np.average(step.reshape(_GROUPS, -1), axis=1, weights=kept))
-    return np.asarray(np.where(slope > 0.0, height / (np.sqrt(2.0 * np.pi) * np.maximum(slope, 1e-12)), np.nan))
+    return np.asarray(np.where(slope > 0.0, height / (np.sqrt(2.0 * np.pi) * np.maximum(slope, 1e-12)), 0.0))
 
 
 def _without_print(ends: NDArray[np.float32]) -> Array:

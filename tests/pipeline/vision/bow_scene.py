@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.records import Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline.measurement import measure_centerline
+from pipeline.vision.centerline.measurement import centerline_of, follow_cable
 from pipeline.vision.render import Camera, Curve, Picture, Scene, Sensor, Strand, render
 from pipeline.vision.render.lighting import EVEN, Light
 from pipeline.vision.render.sheath import Sheath
@@ -127,6 +127,14 @@ def rough_cable(
         contrast=0.6,
         blur_px=scene.sensor.blur_px,
     )
+
+
+def measure_centerline(
+    rough: RoughCable, *, plane: PlaneMap, diameter_m: float | None, settings: VisionSettings
+) -> Centerline | Rejected:
+    """Centerline of a cable on a single photo, or why there is none."""
+    followed = follow_cable(rough, plane=plane, diameter_m=diameter_m)
+    return followed if isinstance(followed, Rejected) else centerline_of(followed, settings)
 
 
 def trace(

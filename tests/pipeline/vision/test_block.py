@@ -6,13 +6,12 @@ import pytest
 
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.covers import BearingHints
-from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import render
 from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.segmentation import find_cable
-from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, errors
+from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, errors, measure_centerline
 
 
 @pytest.mark.parametrize("seed", [8, 9])

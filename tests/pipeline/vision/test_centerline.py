@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 from pipeline.records import Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline import midline
-from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.render import render
 from pipeline.vision.render.ground import Ground
 from pipeline.vision.render.sheath import WHITE, Sheath
@@ -23,6 +22,7 @@ from tests.pipeline.vision.bow_scene import (
     LENGTH,
     bow_scene,
     directional,
+    measure_centerline,
     rms,
     rough_cable,
     trace,

@@ -15,7 +15,6 @@ import pytest
 from fixtures.photographed.renderer import photograph, random_look
 from pipeline.records import Centerline
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline.measurement import measure_centerline
 from pipeline.vision.photo import Photo
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import Bearing, RoughCable
@@ -29,6 +28,7 @@ from tests.pipeline.vision.bow_scene import (
     directional,
     errors,
     led_astray,
+    measure_centerline,
     rms,
     traced_errors,
 )

@@ -13,16 +13,32 @@ from scipy.spatial import cKDTree
 from fixtures.grounds import cloth
 from pipeline.records import Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline.measurement import measure_centerline
+from pipeline.vision.bearings.covers import BearingHints
+from pipeline.vision.judgement import Cable
+from pipeline.vision.photo import Photo
 from pipeline.vision.render import Ground, render
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.scale.plane import PlaneMap
+from pipeline.vision.segmentation import find_cable
 from pipeline.vision.single import trace_photo
-from tests.pipeline.vision.bow_scene import DIAMETER, bow_scene, directional, errors, rough_cable
+from tests.pipeline.vision.bow_scene import (
+    COVER,
+    DIAMETER,
+    LENGTH,
+    bow_scene,
+    directional,
+    errors,
+    measure_centerline,
+    rough_cable,
+)
 
 
 def even(rng, **options):
     return bow_scene(rng, **options)
+
+
+def lit(rng, **options):
+    return bow_scene(rng, light=directional(rng), **options)
 
 
 @pytest.mark.parametrize("diameters", [8, 12])
@@ -108,6 +124,34 @@ def test_wrong_diameter_is_refused_with_the_figure(wrong):
     assert_allclose(found.figure["width_over_diameter"], 1.0 / wrong, rtol=0.01)  # half a pixel of 55
 
 
+def test_a_soft_cable_may_seem_narrower_by_its_blur():
+    """Cable of 11 px, blur of a fifth of it: the refusal said that it was split along a highlight."""
+    rng = np.random.default_rng(9)
+    scene = even(rng, px_per_mm=2.5, blur=2.5)
+    found = refused(rough_cable(scene, render(scene), rng), scene, diameter=1.25 * DIAMETER)
+    assert isinstance(found, Centerline), found.reason
+    assert found.quality["width_over_diameter"] < 0.85
+
+
+@pytest.mark.parametrize(
+    ("sides", "sure", "traced"),
+    [(["left"], True, True), (["left"], False, False), (["left", "right"], True, False)],
+    ids=["one cover", "half seen", "both"],
+)
+def test_a_cable_may_pass_beside_one_cover_that_is_surely_seen(sides, sure, traced):
+    """Not every cable runs through the axis; a flank passes beside both, half a rim may be another thing's."""
+    rng = np.random.default_rng(12)
+    scene = even(rng, camera={"mirrored": False, "roll_rad": 0.0})
+    rough = rough_cable(scene, render(scene), rng)
+    beside = np.array([0.0, -1.3 * rough.half_width_px])
+    for side in sides:
+        axis = getattr(rough, side)
+        rough = replace(rough, **{side: replace(axis, center_px=tuple(axis.center_px + beside), sure=sure)})
+    found = refused(rough, scene)
+    assert isinstance(found, Centerline) == traced
+    assert (found.findings[0].code if traced else found.code) == "photo/bearing"
+
+
 def test_noise_and_blur_widen_the_band_and_refuse_only_where_no_edge_is_left():
     """Edges as faint as the noise of a pixel, and blur of half the radius: traced, and the band holds the truth."""
     rng = np.random.default_rng(10)
@@ -125,6 +169,26 @@ def test_noise_and_blur_widen_the_band_and_refuse_only_where_no_edge_is_left():
     found = refused(rough_cable(soft, picture, rng), soft)
     assert isinstance(found, Centerline), found.reason
     assert errors(picture, found, soft.camera.px_per_m).covered().mean() > 0.9
+
+
+@pytest.mark.parametrize(("make", "most_px"), [(even, 0.1), (lit, 0.3)], ids=["even", "lit"])
+def test_a_motion_by_a_third_of_the_width_is_in_the_band(make, most_px):
+    """Each edge is a ramp of 13 px where the motion runs across it: windows of a sharp edge hold none of its ends."""
+    covered = []
+    for seed in (1, 2, 5):
+        rng = np.random.default_rng([3, seed])
+        scene = make(rng, px_per_mm=8.0)
+        scene = replace(scene, sensor=replace(scene.sensor, motion_px=13.0, motion_rad=rng.uniform(0.0, np.pi)))
+        picture, scale = render(scene), scene.camera.px_per_m
+        known = Cable(DIAMETER * scale, LENGTH * scale, BearingHints(cover_px=2.0 * COVER * scale))
+        found = find_cable(Photo("a.png", picture.pixels, 8), cable=known)
+        assert not isinstance(found, Rejected), found.reason
+        found = refused(found, scene)
+        assert isinstance(found, Centerline), found.reason
+        off = errors(picture, found, scale)
+        assert off.position() < most_px  # windows of the usual edge: 2 px
+        covered.append(off.covered().mean())
+    assert np.mean(covered) > 0.9
 
 
 @pytest.mark.parametrize("seed", [15, 17, 18, 19])

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import cache
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -198,6 +199,26 @@ def test_other_photos_tell_where_the_fixed_cover_stands(
             assert line.chord_m == pytest.approx(curve.chord, abs=5 * line.chord_std_m)  # as without the shadow
             assert line.chord_std_m < TENTH_OF_A_PIXEL
     assert not codes(traces)
+
+
+def test_a_cover_half_seen_on_one_photo_does_not_make_the_others_doubt_theirs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a photo taken in motion the rim is doubled: that its cover lies 2 px away is within its own error."""
+    sound = shots_module.find_cable
+
+    def doubled(photo: Photo, **known: Any) -> RoughCable | Rejected:
+        found = sound(photo, **known)
+        if photo.name != "step_02.png" or isinstance(found, Rejected):
+            return found
+        u, v = found.right.center_px
+        return replace(found, right=replace(found.right, center_px=(u + 2.0, v), std_px=1.0, sure=False))
+
+    monkeypatch.setattr(shots_module, "find_cable", doubled)
+    traces = trace_series(series(tmp_path), SETTINGS)
+    assert not codes(traces)
+    for line in lines(traces)[:2]:
+        assert line.chord_std_m < TENTH_OF_A_PIXEL
 
 
 def test_given_axes_follow_the_displacement(tmp_path: Path) -> None:
