@@ -227,6 +227,15 @@ def test_two_causes_that_hide_each_other_are_found_with_their_twins():
     assert found["set"] == [] and correct(found) and not found["alien"], found["classes"]
 
 
+@pytest.mark.parametrize(
+    ("protocol", "names"), [("loop", ("hysteresis", "lens_distortion")), ("six", ("scale_error", "out_of_plane_bow"))]
+)
+def test_two_causes_are_found_where_a_third_explains_more_than_either(protocol, names):
+    """Friction of the bearings, or a lens, leaves less alone than either of the two; beside it another fits."""
+    found = record(Trial("pair", protocol, 301112, names, 4.0))
+    assert correct(found) and not found["alien"], found["classes"]
+
+
 @pytest.mark.parametrize("alien", ["waves", "sticking"])
 def test_an_effect_outside_the_catalogue_is_unexplained(alien):
     """Patterns from step to step that no cause makes, twelve sigma beside the best of them; shares are in the study."""
