@@ -16,7 +16,8 @@ A fit whitens its rows by the noise that is likeliest beforehand. What is known 
 
     smooth    sum_k c_k sin(k pi s / L) / k^2, k to 12; over the steps sum_o t_o / (1 + o), t_o cosines of order o
     rough     the same with 1 / k, at each step for itself, as the forces
-    pattern   one wave sin(k pi s / L), or one bump at a place, as large as it likes at each step
+    pattern   one wave sin(k pi s / L), or one bump at a place, or one bearing whose axis is elsewhere along or across
+              the chord (a cover that slips), as large as it likes at each step
 
 In whitened rows the covariance is
 
@@ -25,8 +26,7 @@ In whitened rows the covariance is
 
 and displacements are further unknowns, known to ``moved``, as are the forms of causes that every rig has a little of
 (`rod.inverse.cause.Variant.ordinary`): too little to be named. Along the eigenvectors of D all other
-sizes cost a sum.
-Notation of the products: G grid points, o own columns, k added ones.
+sizes cost a sum. Notation of the products: G grid points, o own columns, k added ones.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from scipy.special import chdtri, ndtr
 from pipeline.diagnosis.fits.workbench import SCATTER
 from rod.inverse.common_errors import shared_light
 from rod.inverse.noise import by_axes, slow_errors
-from rod.inverse.observation import Observation
+from rod.inverse.observation import Observation, PhotoData
 from rod.inverse.prediction import Facts
 
 Array = NDArray[np.float64]
@@ -299,11 +299,13 @@ def error_grid(observation: Observation, facts: Facts, rig: Array) -> ErrorGrid:
         kinds = [kinds[0]._replace(chance=WAVES[False]), Kind(by_power[1], held[1], faint, WAVES[True], noise=True)]
     kinds += [Kind(shapes, holds, every[1:], 1.0 / 3.0) for shapes, holds in zip(by_power, held, strict=True)]
     bumps = _shown(observation, facts, photos, lambda u: np.exp(-0.5 * (np.subtract.outer(u, PLACES) / WIDTH) ** 2))
-    waves_and_bumps = np.hstack([_shown(observation, facts, photos, partial(_waves, power=0)), bumps])
+    waves = _shown(observation, facts, photos, partial(_waves, power=0))
+    axes = facts.length * _rows(observation, photos, lambda photo: by_axes(photo.sections, photo.chord))
     alone = every[(every[:, 1] == 0) & (every[:, 0] > 0)]
-    for pattern in waves_and_bumps.T:
+    patterns = np.hstack([waves, bumps, axes]).T
+    for pattern in patterns:
         spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
-        kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / waves_and_bumps.shape[1]))
+        kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / len(patterns)))
     log_det = np.array([np.sum(np.log(one)) for one in wide])
     return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), hold_sizes(observation), rig)
 
@@ -356,13 +358,18 @@ def _of_holds(observation: Observation, facts: Facts, forces: NDArray[np.int_], 
 
 def _shown(observation: Observation, facts: Facts, photos: NDArray[np.int_], forms: Forms) -> Array:
     """Whitened photo rows (n, j) of forms across the cable, each as large as the cable is long."""
-    step = observation.rows.step[photos]
-    parts = [np.zeros((0, 0))] * len(photos)
-    for photo in observation.photos:
-        own = facts.length * photo.whiten[:, 1:] @ forms(photo.sections.s / facts.length)
-        for k, row in zip(np.flatnonzero(step == photo.step), own, strict=True):
-            parts[k] = row
-    return np.array(parts).reshape(len(photos), forms(np.zeros(1)).shape[1])
+    return _rows(
+        observation, photos, lambda p: np.pad(facts.length * forms(p.sections.s / facts.length), ((1, 0), (0, 0)))
+    )
+
+
+def _rows(observation: Observation, photos: NDArray[np.int_], of: Callable[[PhotoData], Array]) -> Array:
+    """Whitened photo rows (n, j) of what is to be whitened ``of`` each photo, (1 + k, j): of its chord and sections."""
+    step, own = observation.rows.step[photos], [(p.step, p.whiten @ of(p)) for p in observation.photos]
+    shown = np.zeros((len(photos), own[0][1].shape[1] if own else 0))
+    for at, rows in own:
+        shown[step == at] = rows
+    return shown
 
 
 def _of_photos(
