@@ -12,6 +12,7 @@ from pipeline.vision.bearings import cover_size
 from pipeline.vision.bearings.cover_size import cover_radius, visible_ends
 from pipeline.vision.bearings.covers import BearingHints, find_again, find_bearings, find_cover, find_rim, left_first
 from pipeline.vision.bearings.rim import SAME_RADIUS, Circle, Radius
+from pipeline.vision.bearings.steady import fixed_cover
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
@@ -375,3 +376,15 @@ def test_cover_hardly_off_the_ground_is_found_again_by_its_dot(seed):
     circle = find_again(Photo("a", np.rint(grey).astype(np.uint8), 8), end, (seen,), Radius(15.4, 0.05))
     assert circle is not None
     assert circle.center == pytest.approx(center, abs=0.1)
+
+
+@pytest.mark.parametrize(("std_px", "astray"), [(0.5, ()), (0.05, (3,))])
+def test_a_cover_that_is_off_by_its_own_error_stands_still(std_px: float, astray: tuple[int, ...]) -> None:
+    """On pictures of few pixels a cover is found to half a pixel, more than the play of a rig."""
+    path, grey = np.zeros((2, 2)), np.zeros((1, 1), np.float32)
+    found = []
+    for moved, off in enumerate((0.0, 0.1, -0.1, 1.0)):
+        left, right = (Bearing(place, std_px, 36.0) for place in ((90.0 + 20.0 * moved, 120.0), (610.0 + off, 90.0)))
+        found.append(RoughCable("a", path, (0, 1), left, right, 14.0, grey, (0, 0), True, 0.4, 1.0))
+    fixed = fixed_cover(found, 0.3)
+    assert fixed is not None and (fixed.side, fixed.astray) == ("right", astray)

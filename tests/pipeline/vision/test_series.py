@@ -20,12 +20,11 @@ from pipeline.records import CameraSpec, Centerline, LoadStep, PhotoHints, Rejec
 from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision import shots as shots_module
-from pipeline.vision.bearings.steady import fixed_cover
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, render
 from pipeline.vision.render.sheath import Sheath
-from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.rough import RoughCable
 from pipeline.vision.series import trace_series
 from pipeline.vision.single import trace_photo
 
@@ -395,15 +394,3 @@ def test_photos_without_a_cable_are_searched_again_with_what_the_others_tell(
     again = () if lost == (2,) else lost
     assert [isinstance(photo, Centerline) for photo in photos] == [k in again or k not in lost for k in range(3)]
     assert asked == [f"step_{k:02d}.png" for k in (0, 1, 2, *again)]
-
-
-@pytest.mark.parametrize(("std_px", "astray"), [(0.5, ()), (0.05, (3,))])
-def test_a_cover_that_is_off_by_its_own_error_stands_still(std_px: float, astray: tuple[int, ...]) -> None:
-    """On pictures of few pixels a cover is found to half a pixel, more than the play of a rig."""
-    path, grey = np.zeros((2, 2)), np.zeros((1, 1), np.float32)
-    found = []
-    for moved, off in enumerate((0.0, 0.1, -0.1, 1.0)):
-        left, right = (Bearing(place, std_px, 36.0) for place in ((90.0 + 20.0 * moved, 120.0), (610.0 + off, 90.0)))
-        found.append(RoughCable("a", path, (0, 1), left, right, 14.0, grey, (0, 0), True, 0.4, 1.0))
-    fixed = fixed_cover(found, 0.3)
-    assert fixed is not None and (fixed.side, fixed.astray) == ("right", astray)
