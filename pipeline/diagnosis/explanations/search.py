@@ -1,8 +1,9 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what scores beside those that the data allow refitted -> pairs pruned of what they do not need -> where something
-else is likelier still, the best cause with all others -> probabilities of all.
+-> what scores most beside the likeliest four refitted -> causes exchanged while a pair that shares one with the
+likeliest is likelier -> pairs pruned of what they do not need -> where something else is likelier still, the best cause
+with all others -> probabilities of all.
 
 Two causes may hide each other, each below its threshold: where no single one is likely, or something else is likelier,
 the pair that removes most by the linear scores is fitted from both at once (`together`).
