@@ -64,8 +64,8 @@ class BendingTest:
         Springs, Coulomb moments, rigid pieces, clamps; see `rod.support`.
     load : (2,) N/m
         Distributed dead load along x and y of the chord frame.
-    friction_by_step : (steps,) N m or None
-        Added to the Coulomb moment of both bearings step by step; the last one stays.
+    friction_by_step : (steps, 2) N m or None
+        Added to the Coulomb moments of the left and the right bearing step by step; the last ones stay.
     compliance, stiffening : m/N, 1/N
         Of the rig, see `rod.reduction.Hold`.
     friction : InternalFriction or None
@@ -140,8 +140,11 @@ class BendingTest:
         """The rod of a step, where the bearings differ from step to step."""
         if self.friction_by_step is None:
             return self.rod
-        more = float(self.friction_by_step[min(step, len(self.friction_by_step) - 1)])
-        left, right = (replace(s, friction_moment=max(s.friction_moment + more, 0.0)) for s in (self.left, self.right))
+        more = self.friction_by_step[min(step, len(self.friction_by_step) - 1)]
+        left, right = (
+            replace(end, friction_moment=max(end.friction_moment + float(by), 0.0))
+            for end, by in zip((self.left, self.right), more, strict=True)
+        )
         return replace(self.rod, left=left, right=right)
 
     @cached_property

@@ -49,6 +49,8 @@ class Toward:
 
 Parameter = str | tuple[str, Array] | Toward
 
+_SIDES = ("left", "right")
+
 
 @dataclass(frozen=True, eq=False)
 class Directions:
@@ -67,8 +69,10 @@ class Directions:
         Everything that is one number, under its name in the table or in `BendingTest.numbers`.
     laws : list of (column, MomentCurve, MomentCurve, step)
         From which law to which the characteristic goes when that parameter grows by the step.
-    grown, friction_by_step : dict of column -> (steps, n), (steps,)
-        Of the set, and of the friction of both bearings, that are given step by step.
+    grown : dict of column -> (steps, n)
+        Of the set that is given step by step.
+    friction_by_step : dict of side -> dict of column -> (steps,)
+        Of the friction of the bearings that is given step by step.
     """
 
     names: tuple[str, ...]
@@ -81,7 +85,7 @@ class Directions:
     scalars: dict[str, Array] = field(init=False, default_factory=dict)
     laws: list[tuple[int, MomentCurve, MomentCurve, float]] = field(init=False, default_factory=list)
     grown: dict[int, Array] = field(init=False, default_factory=dict)
-    friction_by_step: dict[int, Array] = field(init=False, default_factory=dict)
+    friction_by_step: dict[str, dict[int, Array]] = field(init=False, default_factory=lambda: {s: {} for s in _SIDES})
 
     def scalar(self, name: str) -> Array:
         """Change of one number per parameter, (q,); zeros if it is none of them."""
@@ -201,7 +205,8 @@ def _go_toward(toward: Toward, made: Directions, column: int) -> None:
     if test.grown is not None and other.grown is not None:
         made.grown[column] = (other.grown - test.grown) / step
     if test.friction_by_step is not None and other.friction_by_step is not None:
-        made.friction_by_step[column] = (other.friction_by_step - test.friction_by_step) / step
+        for side, change in zip(_SIDES, (other.friction_by_step - test.friction_by_step).T / step, strict=True):
+            made.friction_by_step[side][column] = change
     for name, old in test.numbers.items():
         if (new := other.numbers[name]) != old:
             made.moved(name, column, (new - old) / step)

@@ -270,7 +270,7 @@ def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, 
     u = (angle - (step.before.left_angle if left else step.before.right_angle)) / support.stick_angle
     moment = moves.scalar(f"end_moment_{side}") * (-1.0 if left else 1.0)
     moment = moment + moves.scalar(f"bearing_stiffness_{side}") * (angle - at_rest)
-    friction = moves.scalar(f"bearing_friction_{side}") + moves.given(moves.friction_by_step, step.before.step)
+    friction = moves.scalar(f"bearing_friction_{side}") + moves.given(moves.friction_by_step[side], step.before.step)
     moment = moment + friction * min(1.0, max(-1.0, u))
     if support.stiffness:
         rest = moves.scalar(f"clamp_angle_{side}") if support.angle is not None else rest

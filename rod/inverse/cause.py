@@ -135,6 +135,13 @@ class Cause(ABC):
         """Forms to be tried, one unless there are several; empty where the data cannot show the cause at all."""
         return PLAIN
 
+    def by_step(self, amount: float, facts: Facts) -> tuple[tuple[Variant, ...], ...]:
+        """Ways in which a cause of that ``amount`` differs from step to step, each the forms put beside it.
+
+        What is known of their amounts says by how much (`Variant.known`). Empty for causes that do not differ.
+        """
+        return ()
+
     @abstractmethod
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """The model with the cause in it."""

@@ -170,10 +170,11 @@ def test_groups_of_elements_add_up() -> None:
 
 
 def test_friction_that_differs_from_step_to_step_is_the_moment_at_the_bearings() -> None:
-    """Coulomb: a bearing that turns on resists by its whole friction; the last amount stays, none is negative."""
+    """Coulomb: a bearing that turns on resists by its whole friction; the last amounts stay, none is negative."""
     rubbing = Support(friction_moment=2e-4)
-    test = BendingTest(0.2, 5e-3, 2.0, left=rubbing, right=rubbing, friction_by_step=np.array([3e-4, -1e-4, -5e-4]))
+    more = 1e-4 * np.array([[3.0, 0.0], [-1.0, 1.0], [-5.0, 4.0]])
+    test = BendingTest(0.2, 5e-3, 2.0, left=rubbing, right=rubbing, friction_by_step=more)
     steps = simulate(test, [4e-3, 8e-3, 12e-3, 16e-3])
-    for step, held in zip(steps, (5e-4, 1e-4, 0.0, 0.0), strict=True):
+    for step, held in zip(steps, ((5e-4, 2e-4), (1e-4, 3e-4), (0.0, 6e-4), (0.0, 6e-4)), strict=True):
         assert step.good
         assert np.abs(step.moment[[0, -1]]) == pytest.approx(held, rel=1e-6, abs=1e-9)

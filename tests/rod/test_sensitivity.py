@@ -289,11 +289,12 @@ def given_set(test: BendingTest, h: float) -> BendingTest:
     return replace(test, grown=test.grown + h * np.outer(np.arange(6.0), BASIS))
 
 
-RUBBING = replace(EVERYTHING, friction=None, plastic_rate=0.0, friction_by_step=1e-4 * np.array([0, 1, -1, 2, 1, -1.0]))
+BY_STEP = 1e-4 * np.c_[[0, 1, -1, 2, 1, -1.0], [1, 1, 2, 0, -1, 1]]
+RUBBING = replace(EVERYTHING, friction=None, plastic_rate=0.0, friction_by_step=BY_STEP)
 
 
 def rubbing(test: BendingTest, h: float) -> BendingTest:
-    return replace(test, friction_by_step=test.friction_by_step + h * np.array([0, 1, 2, -1, 1, 3.0]))
+    return replace(test, friction_by_step=test.friction_by_step + h * np.c_[[0, 1, 2, -1, 1, 3.0], [2, 0, 1, 1, -1, 1]])
 
 
 def stick_angles(test: BendingTest, h: float) -> BendingTest:

@@ -3,9 +3,11 @@
     force_offset  shown = F + a
     force_gain    shown = F (1 + a)
     force_drift   shown = F + a T g(t / T)                   t: since the first hold began, T: until the last one did
-    relaxation    shown = F (1 - a (1 - exp(-t / tau)))      t: since this hold began; sums of such forms
+    relaxation    shown = F (1 - a (1 - exp(-t / tau)))      t: since this hold began; sums of such forms, or
+                  shown = F (1 - a log(1 + t / tau) / log(1 + T / tau))    T: the longest hold
 
 What drifts does so steadily, g(u) = u, or settles like a warm-up or speeds up, g(u) = (1 - exp(-w u)) / (1 - exp(-w)).
+A zero that wanders has another rate in each hold, and between them.
 Relaxation belongs to the cable, but as it scales moments everywhere alike it changes forces only.
 """
 
@@ -13,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,20 +101,69 @@ class ForceDrift(Cause):
         """Steady, settling or speeding up, if the log has times."""
         return (SETTLING,) if facts.timed else ()
 
+    def by_step(self, amount: float, facts: Facts) -> tuple[tuple[Variant, ...], ...]:
+        """Parts of a random walk, after the test as far from zero as the steady drift: holds, and what lies between.
+
+        What happened between two holds only the forces there tell, so f_EI is known no better than that.
+        """
+        if not facts.timed:
+            return ()
+        passing = np.diff(_moments(facts)) / float(np.max(facts.clock))
+        most = max(1.0, abs(amount) / self.plausible(facts))
+        parts = (
+            Variant(WANDERING, at=float(k), known=most / np.sqrt(passing[k])) for k in np.flatnonzero(passing > 0.0)
+        )
+        return (tuple(parts),)
+
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Add ``amount``, the mean rate, times the time since the first hold began."""
+        """Add ``amount``, the mean rate, times the time since the first hold began.
+
+        A form of `by_step` adds ``amount`` times the time that has passed of the part ``at`` of the test, and takes
+        away so much of the mean rate.
+        """
         span = float(np.max(facts.clock)) or 1.0
 
+        def steadily(time: Array) -> Array:
+            return span * passed(time / span, variant.width)
+
+        def wandering(time: Array) -> Array:
+            since, until = _moments(facts)[int(variant.at) : int(variant.at) + 2]
+            return np.asarray(np.clip(time, since, until) - since - time * (min(until, span) - min(since, span)) / span)
+
+        gone = wandering if variant.label == WANDERING else steadily
+
         def reading(force: Array, time: Array, begin: float) -> Array:
-            return np.asarray(force + amount * span * passed((begin + time) / span, variant.width))
+            return np.asarray(force + amount * gone(begin + time))
 
         return model.observed(shown(reading))
+
+
+WANDERING = "wandering"
+"""Label of a drift whose rate changes."""
+
+
+def _moments(facts: Facts) -> Array:
+    """Begin and end of each hold, one after the other, s."""
+    ends = [begin + max(0.0, *times) for begin, times in zip(facts.clock, facts.hold_times, strict=True)]
+    return np.column_stack([facts.clock, ends]).ravel()
+
+
+SLOWLY = "by as much in every tenfold of the time"
+"""Label and setting of a relaxation that has no time constant."""
 
 
 def lost_unseen(fitted_amount: float, variant: Variant, facts: Facts) -> float:
     """Share of a force that relaxation takes in one interval of the log: so long a hold may have lasted unseen."""
     intervals = np.concatenate([np.diff(times) for times in facts.hold_times])
-    return float(fitted_amount * (1.0 - np.exp(-np.median(intervals) / variant.at)))
+    return float(_lost(fitted_amount, variant, facts, np.median(intervals)))
+
+
+def _lost(amount: float, variant: Variant, facts: Facts, since: Array) -> Array:
+    """Share of a moment that is lost a time after it came."""
+    if variant.label == SLOWLY:
+        longest = max(float(np.ptp(times)) for times in facts.hold_times)
+        return np.asarray(amount * np.log1p(since / variant.at) / np.log1p(longest / variant.at))
+    return np.asarray(-amount * np.expm1(-since / variant.at))
 
 
 class Relaxation(Cause):
@@ -144,21 +196,24 @@ class Relaxation(Cause):
             Variant("decaying in every hold"),
             Variant("decaying since every change of the bow", width=1.0, setting="memory"),
         )
-        return tuple(
+        decays = tuple(
             replace(form, at=share * span, tuned=("at",), at_range=reach)
             for form in forms
             for share in (0.1, 0.3, 1.0, 3.0)
         )
+        slowly = Variant(SLOWLY, at=0.03 * span, width=1.0, tuned=("at",), at_range=(1e-3 * span, span), setting=SLOWLY)
+        return (*decays, slowly)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Multiply readings by ``1 - amount (1 - exp(-t / at))``, ``at`` the relaxation time, t since the hold began.
 
+        Plastics relax by nearly as much in every tenfold of the time (Findley, Lai and Onaran 1976): ``at`` is then the
+        time from which on they do.
+
         With a memory (``width`` 1) it is the changes of the moment, force times bow, from hold to hold that decay so,
         each since its own hold began: a standard linear solid, by Boltzmann's superposition.
         """
-
-        def lost(since: Array) -> Array:
-            return np.asarray(-amount * np.expm1(-since / variant.at))
+        lost = partial(_lost, amount, variant, facts)
 
         def observer(prediction: Prediction, facts: Facts) -> Prediction:
             at_once = prediction.force if prediction.at_once is None else prediction.at_once

@@ -28,6 +28,9 @@ WITH_FORCE = "that grows with the force"
 """Label of the friction of a bearing without preload: Coulomb's, by the measured force."""
 
 
+BY_STEP, SCATTER = "differing from step to step", 0.3
+"""Label of friction that differs, and by which share of it (standard deviation) beforehand: an assumption."""
+
 SIDES = ("at the left bearing", "at the right bearing")
 """Labels of what one bearing has alone: a dirty one, a clamp, a cable that is led in."""
 
@@ -65,32 +68,33 @@ class BearingFriction(Cause):
             *(Variant(side, rare=True) for side in SIDES),
         )
 
+    def by_step(self, amount: float, facts: Facts) -> tuple[tuple[Variant, ...], ...]:
+        """Both bearings alike, or each by itself."""
+        alike, opposed = (
+            tuple(Variant(BY_STEP, at=float(k), width=width, known=SCATTER) for k in facts.pushed)
+            for width in (1.0, -1.0)
+        )
+        return alike, (*alike, *opposed)
+
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0.
 
-        That which grows with the force is ``amount`` at the largest one; a form of `by_step` adds ``amount`` at the
-        step ``at``.
+        That which grows with the force is ``amount`` at the largest one; a form of `by_step` adds the share ``amount``
+        over the plausible one of what the left bearing has at the step ``at``, and ``width`` times that at the right.
         """
         bending = model.bending
-        if np.isfinite(variant.known) or variant.label == WITH_FORCE:
-            share = facts.force_share if variant.label == WITH_FORCE else np.eye(len(facts.branch))[int(variant.at)]
-            more = amount * share
-            before = 0.0 if bending.friction_by_step is None else bending.friction_by_step
+        if variant.label in (WITH_FORCE, BY_STEP):
+            steps = len(facts.branch)
+            before = np.zeros((steps, 2)) if bending.friction_by_step is None else bending.friction_by_step
+            if variant.label == WITH_FORCE:
+                more = amount * facts.force_share[:, None] * np.ones(2)
+            else:
+                ends = np.array([bending.left.friction_moment, bending.right.friction_moment])
+                share = amount / self.plausible(facts) * np.array([1.0, variant.width])
+                more = np.eye(steps)[int(variant.at)][:, None] * share * (ends + before)
             return replace(model, bending=replace(bending, friction_by_step=before + more))
         angle = variant.at or bending.left.stick_angle
         return _at_bearings(model, variant, lambda end: replace(end, friction_moment=amount, stick_angle=angle))
-
-
-SCATTER = 0.3
-"""Of a bearing's friction: standard deviation from step to step beforehand; an assumption, no measurement."""
-
-
-def by_step(cause: Cause, amount: float, facts: Facts) -> tuple[Variant, ...]:
-    """Forms in which a cause of some amount differs from step to step; empty for causes that do not."""
-    if not isinstance(cause, BearingFriction) or not amount > 0.0:
-        return ()
-    known = SCATTER * amount / cause.plausible(facts)
-    return tuple(Variant("differing from step to step", at=float(k), known=known) for k in facts.pushed)
 
 
 class BearingStiffness(Cause):

@@ -7,7 +7,7 @@ where they add up to one spot or one step, that is tried in their place.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import forms_between
-from pipeline.diagnosis.causes.rig import by_step
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.statistics.score import descending
@@ -157,24 +156,14 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) 
     return fitted
 
 
-def differing_by_step(observation: Observation, fitted: Fit, cause: Cause) -> Fit:
-    """The model with a cause that differs from step to step, where its evidence is larger.
-
-    The amounts by which it differs are known beforehand to be about zero, so the evidence of both models compares: by
-    the chi-square, prior knowledge included, and by how much better each amount is known afterwards.
-    """
-    own = fitted.extension.terms_of(cause)
-    amount = fitted.amount(own[0])[0] if len(own) == 1 else 0.0
-    terms = tuple(Term(cause, variant) for variant in by_step(cause, amount, fitted.extension.facts))
-    if not terms:
-        return fitted
-    extension = replace(fitted.extension, terms=(*fitted.extension.terms, *terms))
-    found = fit_from(observation, extension, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
-    if found.run.prediction is None:
-        return fitted
-    known = len(terms) * np.log(terms[0].variant.known * cause.plausible(fitted.extension.facts))
-    wider = sum(sign * np.linalg.slogdet(one.covariance)[1] for sign, one in ((1, found), (-1, fitted)))
-    return found if 0.5 * (fitted.chi2 - found.chi2 + wider) > known else fitted
+def differing_by_step(observation: Observation, fitted: Fit, cause: Cause) -> Iterator[Fit]:
+    """The model with a cause in one form, differing from step to step in each of the ways it may."""
+    own, facts = fitted.extension.terms_of(cause), fitted.extension.facts
+    for forms in cause.by_step(fitted.amount(own[0])[0], facts) if len(own) == 1 else ():
+        extension = replace(fitted.extension, terms=(*fitted.extension.terms, *(Term(cause, form) for form in forms)))
+        found = fit_from(observation, extension, np.r_[fitted.vector, np.zeros(len(forms))], fitted)
+        if found.run.prediction is not None:
+            yield found
 
 
 def as_one_form(observation: Observation, fitted: Fit, *, worse: float) -> Fit:

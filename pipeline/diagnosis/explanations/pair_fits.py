@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
-from pipeline.diagnosis.explanations.forms import with_more_forms
+from pipeline.diagnosis.explanations.forms import differing_by_step, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
@@ -97,7 +97,15 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
                 fitted = with_more_forms(bench.observation, fitted, kind, setting, hopeless=hopeless)
         if fitted is not pair.fitted:
             new.append(explanation_of(pair.causes, bench.base, fitted))
+        new += by_step(bench, explanation_of(pair.causes, bench.base, fitted))
     return new
+
+
+def by_step(bench: Workbench, one: Explanation) -> list[Explanation]:
+    """An explanation with its causes differing from step to step, one at a time: the evidence says which it is."""
+    kinds_of = [bench.suspicion.causes[cause] for cause in one.causes]
+    fits = [fitted for kind in kinds_of for fitted in differing_by_step(bench.observation, one.fitted, kind)]
+    return [explanation_of(one.causes, bench.base, fitted) for fitted in fits]
 
 
 IN_ANY_FORM = 2

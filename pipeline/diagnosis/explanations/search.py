@@ -19,7 +19,7 @@ from collections.abc import Container, Iterator, Sequence
 import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
-from pipeline.diagnosis.explanations.pair_fits import in_any_form, pairs_beside, together, with_all_forms
+from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -99,7 +99,7 @@ class Search:
             one = refit_one(self.bench.observation, self.bench.base, self.bench.suspicion, cause, rival=rival)
             if one is not None and one.gain > 0.0:
                 rival = min(rival, one.fitted.chi2)
-                yield one
+                yield from (one, *by_step(self.bench, one))
 
     def beside(self, one: Explanation) -> Suspicion:
         """Scores of all causes about a single cause."""
@@ -113,7 +113,7 @@ class Search:
         Pairs are exchanged until none that shares a cause with the likeliest one is likelier: of two causes that act
         together one alone may look like a third, and what scores most beside that third is neither.
         """
-        bench, best, begun = self.bench, singles[0], {one.causes for one in singles}
+        bench, begun = self.bench, {one.causes for one in singles}
         found += [pair for one in singles for pair in self._with_others(one)]
         # what the linear model promised of two causes counts no more: they were fitted
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
@@ -123,8 +123,10 @@ class Search:
             found += self.add(self._with_others(member))
         self.add(list(self._pruned(found)))
         believed = self.posterior
-        # before something is called unexplained, the best cause is fitted with every other one
+        # before something is called unexplained, every other cause is tried in its place beside the nearest one
         if believed.word == "rest":
+            alone = (one.found for one in believed.beside_something_else() if len(one.causes) == 1)
+            best = next((one for one in alone if one is not None), singles[0])
             second = self.beside(best)
             every = candidates(second, margin=1.0, most=len(second.causes))
             others = [cause for cause in every if not any({*best.causes, cause} == {*pair.causes} for pair in found)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
-from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, differing_by_step, with_more_forms
+from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import price, with_free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
@@ -43,7 +43,6 @@ def refit_one(
             for setting, one in best.items():
                 best[setting] = _several(observation, one, kind, setting, hopeless=hopeless)
         found = min(best.values(), key=cost, default=None)
-        found = None if found is None else differing_by_step(observation, found, kind)
     return None if found is None else explanation_of((cause,), base, found)
 
 

@@ -45,6 +45,7 @@ class Explanation:
     def amount(self, cause: Cause) -> tuple[float, float]:
         """Size of a cause and its standard deviation: the sum of its forms where they add up, else the largest.
 
+        What differs from step to step does so about that size.
         That of a profile along the cable is its largest deviation beyond doubt, of all forms together.
         """
         extension, own = self.fitted.extension, self.fitted.extension.terms_of(cause)
@@ -56,7 +57,8 @@ class Explanation:
         elif cause.additive:
             weight = np.ones(len(own))
         else:
-            return max((self.fitted.amount(i) for i in own), key=lambda pair: abs(pair[0]))
+            whole = [k for k in own if not np.isfinite(extension.terms[k].variant.known)]
+            return max((self.fitted.amount(i) for i in whole), key=lambda pair: abs(pair[0]))
         variance = float(weight @ covariance @ weight)
         return float(weight @ self.fitted.vector[at]), float(np.sqrt(max(variance, 0.0)))
 

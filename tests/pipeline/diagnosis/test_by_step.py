@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from fixtures.continuum import Cable, bend
 from fixtures.effects import LARGEST, PROTOCOLS
@@ -29,11 +30,15 @@ def found(cable, protocol, seed, reading=None):
     return part, float(np.mean(np.abs(f - truth) <= 1.96 * std))
 
 
-def test_friction_of_the_bearings_that_differs_from_step_to_step():
-    factors = (1.0, 0.7, 1.5, 0.8, 1.2, 0.6, 1.4)
+BOTH = (1.0, 0.7, 1.5, 0.8, 1.2, 0.6, 1.4)
+EACH = tuple(zip(BOTH, (1.1, 1.3, 0.5, 0.9, 0.5, 1.5, 0.8), strict=True))
+
+
+@pytest.mark.parametrize(("factors", "forms"), [(BOTH, 7), (EACH, 13)])
+def test_friction_of_the_bearings_that_differs_from_step_to_step(factors, forms):
     part, covered = found(Cable(bearing_friction=1.2e-3, friction_varies=factors), "loop", 41)
     assert part.verdict == "named" and part.causes[0].name == "bearing_friction", part.headline
-    assert len(part.causes[0].forms) == 7 and covered > 0.9
+    assert len(part.causes[0].forms) == forms and covered > 0.9
     # the mean is known no better than the single ones scatter
     assert part.causes[0].estimate == pytest.approx(1.2e-3, rel=0.3)
 
@@ -96,6 +101,44 @@ def test_relaxation_of_a_spring_in_series_with_a_dashpot_is_remembered(protocol,
     assert np.sqrt(np.mean((f / (at_once - lost) - 1.0) ** 2)) < 0.02
     # a share of what was left at the first sample
     assert part.causes[0].estimate == pytest.approx(0.2, abs=4.0 * part.causes[0].std + lost / at_once)
+
+
+@pytest.mark.parametrize(("protocol", "seed"), [("six", 71), ("six", 72), ("loop", 71)])
+def test_a_zero_of_the_load_cell_that_wanders(protocol, seed):
+    """A smooth random path, which shows while a step is held as well as from one to the next."""
+    cable = Cable()
+    test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=seed)
+    walk = 0.03 * max(abs(step.force) for step in test.steps) * np.random.default_rng(seed).standard_normal(6)
+    zero = PchipInterpolator(np.linspace(0.0, test.steps[-1].time, 7), np.append(0.0, np.cumsum(walk)))
+    steps = [
+        replace(step, force=step.force + float(zero(step.time)), hold_forces=step.hold_forces + zero(step.hold_times))
+        for step in test.steps
+    ]
+    part, _, _ = diagnose(faults_of_input(replace(test, steps=tuple(steps))), None)
+    assert part.verdict == "named" and part.causes[0].name == "force_drift", part.headline
+    K, f, std = (np.array(getattr(part.extended, of)) for of in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2"))
+    assert np.mean(np.abs(f - cable.law(K - cable.K0)[1]) <= 1.96 * std) > 0.9 and np.median(std / f) < 0.1
+
+
+def test_relaxation_by_a_power_law_has_no_time_constant():
+    """Plastics relax as t^-n (Findley, Lai and Onaran 1976), by the moment, which goes with force times bow."""
+    cable = Cable(EI0=0.010, EI1=0.010)
+    test = hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=65)
+    steps = test.steps
+    bow = np.array([max(float(step.shape.y.max()), 1e-9) for step in steps])
+    change = np.diff([step.force * high for step, high in zip(steps, bow, strict=True)], prepend=0.0)
+    begins = np.array([step.hold_times[0] - 0.5 for step in steps])
+    relaxed = []
+    for k, step in enumerate(steps):
+        since = step.hold_times - begins[: k + 1, None]
+        lost = change[: k + 1] @ (1.0 - (1.0 + since / 2.0) ** -0.05) / bow[k]
+        relaxed.append(replace(step, force=step.force - lost[-1], hold_forces=step.hold_forces - lost))
+    part, _, _ = diagnose(faults_of_input(replace(test, steps=tuple(relaxed))), None)
+    assert part.verdict == "named" and part.causes[0].name == "relaxation", part.headline
+    assert [form.label for form in part.causes[0].forms] == ["by as much in every tenfold of the time"]
+    f, std = np.array(part.extended.tangent_Nm2), np.array(part.extended.tangent_std_Nm2)
+    unseen = 1.0 - (1.0 + np.median(np.diff(steps[0].hold_times)) / 2.0) ** -0.05
+    assert np.mean(np.abs(f - 0.010) < 1.96 * std) > 0.9 and np.median(std / f) < 0.01 + unseen
 
 
 def half_sine(u):
