@@ -10,7 +10,6 @@ import pytest
 
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.profile import piece, step, wave
-from pipeline.diagnosis.causes.rig import BearingFriction, by_step
 from pipeline.messages import catalogue
 from pipeline.report.diagnosed import _named
 from pipeline.report.words import Words, documented_codes
@@ -70,7 +69,8 @@ def test_every_form_of_a_cause_is_said_in_words():
     facts = SimpleNamespace(
         branch=("mounted", "loading", "loading", "unloading"),
         bends=np.ones(4),
-        hold_times=(np.arange(3.0),),
+        hold_times=(np.arange(3.0),) * 4,
+        clock=10.0 * np.arange(4.0),
         timed=True,
         returns=True,
         rest_side="natural",
@@ -78,7 +78,7 @@ def test_every_form_of_a_cause_is_said_in_words():
         **dict.fromkeys(("curvature_scale", "moment_scale", "force_scale", "length"), 1.0),
     )
     labels = {(cause.name, form.label) for cause in CATALOGUE for form in cause.variants(facts)}
-    labels |= {("bearing_friction", form.label) for form in by_step(BearingFriction(), 1.0, facts)}
+    labels |= {(cause.name, form.label) for cause in CATALOGUE for way in cause.by_step(1.0, facts) for form in way}
     for name in ("pre_curvature_varying", "stiffness_varying"):
         labels |= {(name, form.label) for form in (piece(), step(), wave(1))}
     said = {tuple(key.split(".", 2)[1:]) for key in catalogue("en") if key.startswith("form.")}

@@ -14,7 +14,7 @@ A refit may fail to find its valley where another one, from beside it, does: so 
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -43,13 +43,16 @@ NEEDED = 2.5
 """Standard deviations from nothing that each member of a pair must have to be left in it."""
 
 
+Forms = tuple[int, frozenset[str]]
+
+
 class Search:
     """Hypotheses about one specimen as they are found, and their probabilities."""
 
     def __init__(self, bench: Workbench) -> None:
         self.bench = bench
         self.grid: ErrorGrid = error_models(bench.observation, bench.base, bench.suspicion)
-        self._about: dict[tuple[int, ...], Suspicion] = {}
+        self._about: dict[Explanation, Suspicion] = {}
         self.causes = [cause for k, cause in enumerate(bench.suspicion.causes) if bench.suspicion.of(k).size]
         first = weighed(self.grid, bench.base, bench.suspicion)
         self.hypotheses = [Hypothesis((), first.own.plain, first.own.rest)]
@@ -103,23 +106,24 @@ class Search:
 
     def beside(self, one: Explanation) -> Suspicion:
         """Scores of all causes about a single cause."""
-        if one.causes not in self._about:
-            self._about[one.causes] = suspect(self.bench.observation, one.fitted, self.bench.suspicion.causes)
-        return self._about[one.causes]
+        if one not in self._about:
+            self._about[one] = suspect(self.bench.observation, one.fitted, self.bench.suspicion.causes)
+        return self._about[one]
 
     def pairs(self, singles: Sequence[Explanation], found: list[Explanation]) -> None:
         """Refit pairs besides those ``found``: single causes with what scores most beside each.
 
         Pairs are exchanged until none that shares a cause with the likeliest one is likelier: of two causes that act
-        together one alone may look like a third, and what scores most beside that third is neither.
+        together one alone may look like a third, and what scores most beside that third is neither. Each stays in the
+        form that it has in the pair.
         """
-        bench, begun = self.bench, {one.causes for one in singles}
+        bench, begun = self.bench, {self._forms(one, one.causes[0]) for one in singles}
         found += [pair for one in singles for pair in self._with_others(one)]
         # what the linear model promised of two causes counts no more: they were fitted
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
-        while (member := self._member_alone(begun)) is not None:
-            begun.add(member.causes)
+        for member in self._members_alone(begun):
+            self.add([member])
             found += self.add(self._with_others(member))
         self.add(list(self._pruned(found)))
         believed = self.posterior
@@ -140,32 +144,54 @@ class Search:
         self.add(list(self._pruned(new)))
 
     def _with_others(self, one: Explanation) -> list[Explanation]:
-        """A single cause with each of the two that score most beside it."""
+        """A single cause with each of the two that score most beside it, and of those that are likely by the scores."""
         second = self.beside(one)
-        return pairs_beside(self.bench, one, second, candidates(second)[:2])
+        further = {cause: plain for cause, (plain, _) in weighed(self.grid.plain, one.fitted, second).further.items()}
+        whole = np.logaddexp.reduce([*further.values()])
+        likely = [cause for cause, plain in further.items() if plain > whole + np.log(ALSO)]
+        return pairs_beside(self.bench, one, second, [*dict.fromkeys([*candidates(second)[:2], *likely])])
 
-    def _member_alone(self, begun: Container[tuple[int, ...]]) -> Explanation | None:
-        """A cause of the likeliest pair that no pairs began with, fitted alone."""
-        likeliest = next(iter(self.posterior.explanations(count=2)), None)
-        for cause in () if likeliest is None else likeliest.causes:
-            if (cause,) not in begun:
-                return refit_one(self.bench.observation, self.bench.base, self.bench.suspicion, cause)
-        return None
+    def _members_alone(self, begun: set[Forms]) -> Iterator[Explanation]:
+        """Causes of what is the likeliest pair by then, in forms that no pairs began with, fitted alone."""
+        while True:
+            likeliest = next(iter(self.posterior.explanations(count=2)), None)
+            pair = None if likeliest is None else likeliest.found
+            left = [cause for cause in pair.causes if self._forms(pair, cause) not in begun] if pair is not None else []
+            if pair is None or not left:
+                return
+            begun.add(self._forms(pair, left[0]))
+            rest = self._without(pair, next(cause for cause in pair.causes if cause != left[0]))
+            if rest is not None:
+                yield rest
+
+    def _forms(self, one: Explanation, cause: int) -> Forms:
+        """A cause and the labels of its forms in an explanation."""
+        extension = one.fitted.extension
+        own = extension.terms_of(self.bench.suspicion.causes[cause])
+        return cause, frozenset(extension.terms[k].variant.label for k in own)
+
+    def _without(self, pair: Explanation, gone: int) -> Explanation | None:
+        """A pair without one of its causes, the rest fitted again; None where that is no better than the base."""
+        kind, left = self.bench.suspicion.causes[gone], tuple(cause for cause in pair.causes if cause != gone)
+        extension, vector = pair.fitted.extension.without(pair.fitted.vector, pair.fitted.extension.terms_of(kind))
+        rest = fit_from(self.bench.observation, extension, vector, pair.fitted)
+        if rest.run.prediction is None or rest.chi2 >= self.bench.base.chi2:
+            return None
+        return explanation_of(left, self.bench.base, rest)
 
     def _pruned(self, pairs: Sequence[Explanation]) -> Iterator[Explanation]:
         """Pairs without a member that they do not need, the rest fitted again where no single refit is as good."""
         reached = {one.causes: one.found.fitted.chi2 for one in self.posterior.explanations(count=1) if one.found}
         for pair in pairs:
             weak = min(pair.causes, key=lambda k: pair.sigma(self.bench.suspicion.causes[k]))
-            kind, left = self.bench.suspicion.causes[weak], tuple(k for k in pair.causes if k != weak)
+            left = tuple(k for k in pair.causes if k != weak)
             known = reached.get(left, np.inf) < pair.fitted.chi2 + NEEDED**2
-            if known or pair.sigma(kind) > NEEDED:
+            if known or pair.sigma(self.bench.suspicion.causes[weak]) > NEEDED:
                 continue
-            extension, vector = pair.fitted.extension.without(pair.fitted.vector, pair.fitted.extension.terms_of(kind))
-            rest = fit_from(self.bench.observation, extension, vector, pair.fitted)
-            if rest.run.prediction is not None and rest.chi2 < self.bench.base.chi2:
-                reached[left] = min(rest.chi2, reached.get(left, np.inf))
-                yield explanation_of(left, self.bench.base, rest)
+            rest = self._without(pair, weak)
+            if rest is not None:
+                reached[left] = min(rest.fitted.chi2, reached.get(left, np.inf))
+                yield rest
 
     def pairs_speak(self, best: Explanation) -> bool:
         """Whether the data make two causes, or something else, likelier than they were beforehand; or may do so."""
