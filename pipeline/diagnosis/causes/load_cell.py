@@ -14,7 +14,7 @@ Relaxation belongs to the cable, but as it scales moments everywhere alike it ch
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -122,24 +122,35 @@ class ForceDrift(Cause):
         away so much of the mean rate.
         """
         span = float(np.max(facts.clock)) or 1.0
-
-        def steadily(time: Array) -> Array:
-            return span * passed(time / span, variant.width)
-
-        def wandering(time: Array) -> Array:
-            since, until = _moments(facts)[int(variant.at) : int(variant.at) + 2]
-            return np.asarray(np.clip(time, since, until) - since - time * (min(until, span) - min(since, span)) / span)
-
-        gone = wandering if variant.label == WANDERING else steadily
+        if variant.label == WANDERING:
+            last = model.observers[-1] if model.observers else None
+            rates = last.rates.copy() if isinstance(last, _Wandering) else np.zeros(2 * facts.clock.size - 1)
+            rates[int(variant.at)] += amount
+            kept = model.observers[:-1] if isinstance(last, _Wandering) else model.observers
+            return replace(model, observers=(*kept, _Wandering(rates)))
 
         def reading(force: Array, time: Array, begin: float) -> Array:
-            return np.asarray(force + amount * gone(begin + time))
+            return np.asarray(force + amount * span * passed((begin + time) / span, variant.width))
 
         return model.observed(shown(reading))
 
 
 WANDERING = "wandering"
 """Label of a drift whose rate changes."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Wandering:
+    """Observer whose zero wanders at ``rates`` (2 n - 1,) N/s about a mean rate, in n holds and between them."""
+
+    rates: Array
+
+    def __call__(self, prediction: Prediction, facts: Facts) -> Prediction:
+        moments, span = _moments(facts), float(np.max(facts.clock)) or 1.0
+        path = np.append(0.0, np.cumsum(self.rates * np.diff(moments)))
+        path -= moments / span * np.interp(span, moments, path)
+        zero = shown(lambda force, time, begin: np.asarray(force + np.interp(begin + time, moments, path)))
+        return zero(prediction, facts)
 
 
 def _moments(facts: Facts) -> Array:
