@@ -25,7 +25,7 @@ from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, band_width, environment, palette_css, unbroken
 from pipeline.report.repeats import Repeats, repeats, without_outlying
 from pipeline.report.words import Words
-from pipeline.result import FindingPart, Result, SpecimenPart, read_result
+from pipeline.result import SCHEMA, FindingPart, Result, SpecimenPart, read_result
 from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
 from pipeline.rounding import digits
@@ -89,7 +89,7 @@ def _as_entered(path: Path, entered: float) -> bool:
         head = file.read(HEAD)
         file.seek(max(0, status.st_size - TAIL))
         tail = file.read(TAIL)
-    whole = head.lstrip()[:1] == b"{" and b"cablebend/result/1" in head and tail.rstrip()[-1:] == b"}"
+    whole = head.lstrip()[:1] == b"{" and SCHEMA.encode() in head and tail.rstrip()[-1:] == b"}"
     return whole and status.st_mtime <= entered + COPIED_S
 
 

@@ -41,9 +41,10 @@ from pipeline.result.parts import (
     Widening,
 )
 from pipeline.result.visited import Visited, visited
-from pipeline.result.whole import Result
+from pipeline.result.whole import SCHEMA, Result
 
 __all__ = [
+    "SCHEMA",
     "AgreementPart",
     "Answer",
     "BalancePart",
