@@ -224,12 +224,6 @@ class Rejected:
         """Why, in an English sentence."""
         return str(self.said)
 
-    @property
-    def figure(self) -> dict[str, float]:
-        """The numbers that show why, by name."""
-        values = self.said.values.items()
-        return {name: float(value) for name, value in values if isinstance(value, int | float)}
-
 
 @dataclass(frozen=True)
 class Centerline:
