@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
+
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
@@ -118,8 +120,8 @@ def report_of(result: Result, folder: str, out: Path, settings: ReportSettings) 
 def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     """Text of ``index.html``, piece by piece: data of ten thousand rows are long."""
     words = Words(settings.language)
-    curves = (row.curve for row in rows if row.curve and row.usable)
-    unit = suited((v for curve in curves for v in curve.tangent), "N m²", decimal=words.decimal)
+    means = [float(np.mean(row.curve.tangent)) for row in rows if row.curve and row.usable]
+    unit = suited((float(np.median(means)) if means else 0.0,), "N m²", decimal=words.decimal)
     count = {status: sum(row.status == status for row in rows) for status in STATUSES}
     unusable = sum(row.state == "unusable" for row in rows)
     pooled = list(repeats(rows, unit, words))
