@@ -159,7 +159,7 @@ DATA, CURVES = (f"\N{OBJECT REPLACEMENT CHARACTER}{i}\N{OBJECT REPLACEMENT CHARA
 
 
 def _verdict(row: IndexRow) -> str:
-    """What was found; a verdict on a model that nothing was measured with is none."""
+    """Verdict that the index shows: ``none`` where nothing was measured, ``fault`` where the data are not usable."""
     return {"unusable": "fault", "failed": "none"}.get(row.state, row.verdict)
 
 

@@ -1,7 +1,7 @@
 """``result.json`` written, read back, and its schema.
 
-A result of version 1 is read where its terms mean the same: a plastic set told by ``at``, too, which of its forms it
-has, which its label says; version 2 keeps there how soon the set slows down.
+Version 1 kept the number of a plastic set's form in ``at``, and its name as the label; version 2 keeps in ``at`` how
+soon the set slows down. A result of version 1 is read by the labels of its forms, and refused where one is not known.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _of_earlier(result: Result) -> Result:
 
 
 def _form_of_earlier(cause: str, form: CauseForm) -> CauseForm:
-    """The form of a cause, known by its label: a set has one in any form, other causes in some."""
+    """A form of version 1 in the terms of this one; a plastic set has none without a label."""
     known = f"form.{cause}.{form.label}" in catalogue("en")
     if not known and (form.label or cause == "plastic_set"):
         raise InputError(Message("result/version.form", other=EARLIER, cause=word(cause), form=form.label))
