@@ -219,7 +219,6 @@ def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: P
             status="rejected",
             code=photo.code,
             **PhotoPart.told(photo.said),
-            quality=photo.figure,
             preview=_preview_part(photo.preview),
         )
     shape = photo.shape
@@ -232,7 +231,6 @@ def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: P
         **{name: getattr(photo, name) for name in MEASURED},
         **{name: digits(values, SIGNIFICANT_DIGITS) for name, values in along.items()},
         seen=shape.seen.tolist(),
-        quality={name: float(value) for name, value in photo.quality.items()},
         preview=_preview_part(photo.preview),
         **({} if residual is None else asdict(residual)),
     )

@@ -224,12 +224,6 @@ class Rejected:
         """Why, in an English sentence."""
         return str(self.said)
 
-    @property
-    def figure(self) -> dict[str, float]:
-        """The numbers that show why, by name."""
-        values = self.said.values.items()
-        return {name: float(value) for name, value in values if isinstance(value, int | float)}
-
 
 @dataclass(frozen=True)
 class Centerline:
@@ -258,7 +252,7 @@ class Centerline:
     mirrored : bool
         True if y of the chord frame points up on the photo, against the v axis.
     quality : dict
-        Figures a person may want: contrast_to_noise, blur_px, noise, correlation_px, edge_asymmetry, ...
+        Figures a person may want: contrast_to_noise, blur_px, section_std_px, systematic_px, width_over_diameter.
     findings : tuple of Finding
     preview : Preview or None
     """

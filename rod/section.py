@@ -238,7 +238,7 @@ class Section:
         elastic, K0 = _elastic(self), self.pre_curvature
 
         def with_set(K: Array) -> tuple[Array, Array]:
-            slope = growth(K - K0 - self.set_threshold, self.set_saturation)[1]
+            slope = growth(np.maximum(K - K0 - self.set_threshold, 0.0), self.set_saturation)[1]
             growing = self.plastic_rate * slope * np.greater(K - K0, memory.reached)
             m, tangent = np.zeros((2, *K.shape))
             for read in self.read(K, self.set_at(K, memory)):

@@ -287,10 +287,10 @@ def test_every_setting_says_what_it_is_and_why():
 
 def test_settings_from_file_and_assignments(tmp_path):
     path = tmp_path / "settings.toml"
-    path.write_text("[intake]\nlog_max_bytes = 5\n[vision.photo]\nmax_file_megabytes = 7\n")
+    path.write_text("[intake]\nlog_max_bytes = 5\n[vision.photo]\nmax_megapixels = 7\n")
     settings = read_settings(path, ("intake.log_max_bytes=6", "report.language=de", 'report.language="de"'))
     assert settings.intake.log_max_bytes == 6
-    assert settings.vision.photo.max_file_megabytes == 7
+    assert settings.vision.photo.max_megapixels == 7
     assert settings.report.language == "de"
 
 

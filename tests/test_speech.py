@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 from pathlib import Path
 
 import click
@@ -12,9 +13,11 @@ from pipeline.batch import Tally, run_batch
 from pipeline.cli import main, speech
 from pipeline.cli.design import echo_outlook
 from pipeline.cli.group import COMMANDS
+from pipeline.cli.predict import echo_findings
 from pipeline.cli.run import echo_json
 from pipeline.diagnosis.plans.design import Plan, design
 from pipeline.messages import Message, catalogue
+from pipeline.records import doubtful
 from pipeline.settings import Settings
 from tests.pipeline.cheap_batch import cheap_stages, write_specimens
 
@@ -128,13 +131,23 @@ def test_long_words_and_names_are_wrapped_beside_their_begin(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "order", [["explain"], ["explain", "codes"], ["explain", "hysteresis"], ["check", "toml/missing-key/specimen"]]
+    "order",
+    [["explain"], ["explain", "codes"], ["explain", "hysteresis"], ["check", "toml/missing-key/specimen"], ["design"]],
 )
 def test_pages_and_findings_fit_a_terminal(monkeypatch, order):
-    monkeypatch.setattr(speech, "columns", lambda: 80)
+    for place in (speech, sys.modules["pipeline.cli.design"]):
+        monkeypatch.setattr(place, "columns", lambda: 80)
     monkeypatch.chdir(BROKEN)
     lines = CliRunner().invoke(main, [*order, "--language", "de"], color=True).output.splitlines()
     assert len(lines) > 2 and max(len(click.unstyle(line)) for line in lines) <= 80
+
+
+def test_what_makes_a_comparison_doubtful_fits_a_terminal(monkeypatch, capsys):
+    monkeypatch.setattr(speech, "columns", lambda: 80)
+    echo_findings([doubtful("compare/method", a="inverse", b="balance"), doubtful("compare/length", lengths_m=[1, 2])])
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("warning: One answers with the curve of the inverse problem, the other with that")
+    assert len(lines) > 3 and max(map(len, lines)) <= 80
 
 
 @pytest.mark.parametrize("batch", [{"in_process": True}, {"workers": 2}])

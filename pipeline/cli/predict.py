@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pipeline.cli.options import POSITIVE, language_option
-from pipeline.cli.speech import complaint, entry, note, say, told
+from pipeline.cli.speech import complaint, entry, note, told
 from pipeline.cli.spoken import Spoken, wrong_use
 from pipeline.messages import Message
 
@@ -104,7 +104,8 @@ def echo_prediction(prediction: Prediction) -> None:
     low, high = prediction.visited_per_m
     known = {"length_mm": 1e3 * prediction.length_m, "low_per_m": low, "high_per_m": high}
     rest = (prediction.pre_curvature_per_m, prediction.pre_curvature_std_per_m)
-    say("prediction.model", name=prediction.specimen, method=prediction.method, K0_per_m=rest, **known)
+    model = Message("prediction.model", name=prediction.specimen, method=prediction.method, K0_per_m=rest, **known)
+    click.echo(entry("", told(model)))
     for step in prediction.steps:
         values: dict[str, object] = {}
         if step.force_N is not None and step.force_std_N is not None:
@@ -128,4 +129,5 @@ def echo_prediction(prediction: Prediction) -> None:
 def echo_findings(findings: Iterable[Finding]) -> None:
     """What a reader must know besides, on stderr."""
     for finding in findings:
-        click.echo(f"{told(Message('word.' + finding.level))}: {told(finding.said)} [{finding.code}]", err=True)
+        level = told(Message("word." + finding.level))
+        click.echo(entry(f"{level}: ", f"{told(finding.said)} [{finding.code}]"), err=True)

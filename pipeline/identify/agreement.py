@@ -38,6 +38,9 @@ def log_curve(law: MeasuredLaw) -> LogCurve:
 DISCRETE = 5e-4
 """Of log f over a part of the range: what the elements of the simulated rod change in it, three to one hundred."""
 
+LEVEL = 0.05
+"""Of the test whether both ways agree: the usual one."""
+
 
 @dataclass(frozen=True)
 class Agreement:
@@ -66,7 +69,7 @@ class Agreement:
     hints: tuple[Message, ...] = ()
 
 
-def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level: float) -> Agreement | None:
+def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph) -> Agreement | None:
     """Compare both ways; None if they visited no common curvature."""
     one, two = inverse.law, graph.law
     if one is None or two is None:
@@ -84,9 +87,9 @@ def compare(test: MeasuredTest, inverse: Estimate, graph: BalanceGraph, *, level
         rms_relative=float(np.sqrt(np.mean(ratio**2))),
         max_relative=float(np.max(np.abs(ratio))),
         p_value=p,
-        compatible=p >= level,
-        level=level,
-        hints=() if p >= level else difference_hints(test, one, two, graph.checks.get("left_right_z", 0.0)),
+        compatible=p >= LEVEL,
+        level=LEVEL,
+        hints=() if p >= LEVEL else difference_hints(test, one, two, graph.checks.get("left_right_z", 0.0)),
     )
 
 

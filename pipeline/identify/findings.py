@@ -15,17 +15,35 @@ from rod.balance import BalanceOutcome
 from rod.inverse import InverseOutcome
 from rod.measurement import MeasuredTest
 
+PRE_CURVATURE_SIGMA = 3.5
+"""Standard deviations between two sources of K0 (photo, balance, inverse): of three pairs, one false in 700."""
+
+CHORD_SIGMA = 4.0
+"""Standard deviations of chord against displacement: a false one in 2,000 tests of eight steps."""
+
+NUISANCE_SIGMA = 3.5
+"""Standard deviations of the fitted length or scale from what was given: a false one in 1,000 tests."""
+
+FORCE_ZERO_SIGMA = 4.0
+"""Standard deviations of the force of the force-free step from 0: a false one in 16,000 tests."""
+
+MISFIT_LEVEL = 1e-4
+"""Probability below which residuals count as beyond noise: rare even over many photos."""
+
+BRANCH_LEVEL = 0.01
+"""Level of the test whether loading and unloading show the same characteristic."""
+
 
 def identification_findings(found: Identification, settings: IdentifySettings) -> tuple[Finding, ...]:
     """All findings of an identification, in the order a reader needs them."""
     return (
         *_outcomes(found),
-        *force_findings(found.test, settings),
+        *force_findings(found.test),
         *chord_findings(found.test, settings),
-        *_pre_curvature(found, settings),
-        *_nuisances(found, settings),
-        *_misfit(found, settings),
-        *_comparisons(found, settings),
+        *_pre_curvature(found),
+        *_nuisances(found),
+        *_misfit(found),
+        *_comparisons(found),
     )
 
 
@@ -48,10 +66,10 @@ def _open(kappa: float | None, std: float) -> Message:
     return Message("open.stiffness", at_per_m=kappa, std=std)
 
 
-def force_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[Finding]:
+def force_findings(test: MeasuredTest) -> Iterator[Finding]:
     """The load cell's zero in the force-free step."""
     for step in test.steps:
-        if step.branch == "mounted" and abs(step.force) > settings.force_zero_sigma * step.force_std:
+        if step.branch == "mounted" and abs(step.force) > FORCE_ZERO_SIGMA * step.force_std:
             z = abs(step.force) / step.force_std
             yield doubtful("identify/force-zero", force_N=(step.force, step.force_std), step=step.step, z=z)
 
@@ -69,7 +87,7 @@ def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
     off = chord + moved - zero
     worst = int(np.argmax(np.abs(off) / std))
     # The scale of the photos may be off by its own standard deviation; its part grows with the way.
-    allowed = settings.chord_sigma * np.hypot(std[worst], test.scale_std * np.ptp(moved))
+    allowed = CHORD_SIGMA * np.hypot(std[worst], test.scale_std * np.ptp(moved))
     if abs(off[worst]) > allowed:
         if np.ptp(moved) == 0.0:
             yield doubtful("identify/chord-displacement.one", spread_m=np.ptp(chord))
@@ -85,14 +103,14 @@ def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
         )
 
 
-def _pre_curvature(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+def _pre_curvature(found: Identification) -> Iterator[Finding]:
     sources = pre_curvature_sources(found)
     if "photo" not in sources:
         return
     photo, photo_std = sources["photo"]
     for name, (value, std) in sources.items():
         z = abs(value - photo) / np.hypot(std, photo_std)
-        if name != "photo" and z > settings.pre_curvature_sigma:
+        if name != "photo" and z > PRE_CURVATURE_SIGMA:
             seen = {"photo_per_m": photo, "photo_std_per_m": photo_std, "value_per_m": value, "std_per_m": std}
             yield doubtful(f"identify/pre-curvature-{name}", **seen, z=z)
 
@@ -106,25 +124,25 @@ def pre_curvature_sources(found: Identification) -> dict[str, tuple[float, float
     return sources
 
 
-def _nuisances(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+def _nuisances(found: Identification) -> Iterator[Finding]:
     for name, (value, _, before) in found.inverse.nuisances.items():
         z, given = abs(value) / before, found.test.length
-        if z > settings.nuisance_sigma and name == "length":
+        if z > NUISANCE_SIGMA and name == "length":
             yield doubtful("identify/length", fitted_m=given + value, given_m=given, z=z)
-        elif z > settings.nuisance_sigma and name == "scale":
+        elif z > NUISANCE_SIGMA and name == "scale":
             yield doubtful("identify/scale", change=value, z=z)
 
 
-def _misfit(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+def _misfit(found: Identification) -> Iterator[Finding]:
     for kind in ("shape", "force"):
         chi2, count = found.inverse.chi2(kind)
-        if count and chdtrc(count, chi2) < settings.misfit_level:
+        if count and chdtrc(count, chi2) < MISFIT_LEVEL:
             yield doubtful(f"identify/misfit-{kind}", rms=np.sqrt(chi2 / count))
 
 
-def _comparisons(found: Identification, settings: IdentifySettings) -> Iterator[Finding]:
+def _comparisons(found: Identification) -> Iterator[Finding]:
     laws = [branch.law for branch in found.branches.values() if branch.law is not None]
-    if found.branches_p is not None and found.branches_p < settings.branch_level:
+    if found.branches_p is not None and found.branches_p < BRANCH_LEVEL:
         one, two = ((law.pre_curvature, law.pre_curvature_std) for law in laws)  # loading, unloading
         told = {"one_per_m": one[0], "one_std_per_m": one[1], "two_per_m": two[0], "two_std_per_m": two[1]}
         yield doubtful("identify/branches", **told, p=found.branches_p)

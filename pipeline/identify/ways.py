@@ -47,7 +47,7 @@ def identify_test(test: MeasuredTest, settings: IdentifySettings) -> Identificat
         branches_p=_branches_p(branches),
         rest=rest_curvature(test),
     )
-    found = replace(found, agreement=compare(test, inverse, graph, level=settings.agreement_level))
+    found = replace(found, agreement=compare(test, inverse, graph))
     return replace(found, findings=identification_findings(found, settings))
 
 

@@ -6,6 +6,7 @@ Thumbnails, system files and the calibration folder are left out. Names sort as 
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import unicodedata
@@ -271,9 +272,14 @@ def checked_photo(folder: Path, name: str, settings: IntakeSettings) -> tuple[Pa
         return None, "", [Finding(f"photo/{error.code.partition('/')[2]}", "warning", said)]
 
 
+EMPTY = hashlib.sha256().hexdigest()
+"""Of a file without contents."""
+
+
 def _same_contents(hashes: Mapping[str, str]) -> list[Finding]:
     """A warning for each picture that is there under several names."""
     names: dict[str, list[str]] = {}
     for name, digest in hashes.items():
         names.setdefault(digest, []).append(name)
+    names.pop(EMPTY, None)  # is told for each of them
     return [doubtful("photo/doubled.same", names=_some(same)) for same in names.values() if len(same) > 1]

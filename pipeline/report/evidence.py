@@ -141,8 +141,10 @@ def residual_map(
 
 def map_note(result: Result, words: Words) -> str:
     """How the residual map is read, and what its unit, one standard deviation, is in length."""
-    pairs = [zip(photo.shape_residual_std_m, photo.seen, strict=False) for photo in result.photos]
-    stds = [std for photo in pairs for std, seen in photo if seen]
+    residuals = maps.answer_map(result)
+    rows = [] if residuals is None else zip(residuals.shape_m, residuals.shape_sigma, strict=False)
+    pairs = [pair for row in rows for pair in zip(*row, strict=True)]
+    stds = [abs(left / sigma) for left, sigma in pairs if left is not None and sigma]
     if not stds:
         return words("fig_map_note")
     size = suited(stds, "m", decimal=words.decimal).plain(float(np.median(stds)), 2)

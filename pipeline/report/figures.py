@@ -150,6 +150,10 @@ def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSett
         )
     for method, curve in parts.items():
         _banded(axes, curve.kappa, curve.moment, curve.moment_std, method, unit, words, settings)
+    ends = [end for curve in parts.values() for end in (curve.kappa[0], curve.kappa[-1])]
+    if ends:  # single points of a photo may lie anywhere
+        margin = 0.08 * (max(ends) - min(ends))
+        axes.set_xlim(min(ends) - margin, max(ends) + margin)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     return _over_kappa(axes, "axis_moment", unit, words)
 

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
+
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
@@ -25,7 +27,7 @@ from pipeline.report.files import write_atomic
 from pipeline.report.page import asset, band_width, environment, palette_css, unbroken
 from pipeline.report.repeats import Repeats, repeats, without_outlying
 from pipeline.report.words import Words
-from pipeline.result import FindingPart, Result, SpecimenPart, read_result
+from pipeline.result import SCHEMA, FindingPart, Result, SpecimenPart, read_result
 from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
 from pipeline.rounding import digits
@@ -89,7 +91,7 @@ def _as_entered(path: Path, entered: float) -> bool:
         head = file.read(HEAD)
         file.seek(max(0, status.st_size - TAIL))
         tail = file.read(TAIL)
-    whole = head.lstrip()[:1] == b"{" and b"cablebend/result/1" in head and tail.rstrip()[-1:] == b"}"
+    whole = head.lstrip()[:1] == b"{" and SCHEMA.encode() in head and tail.rstrip()[-1:] == b"}"
     return whole and status.st_mtime <= entered + COPIED_S
 
 
@@ -118,8 +120,8 @@ def report_of(result: Result, folder: str, out: Path, settings: ReportSettings) 
 def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     """Text of ``index.html``, piece by piece: data of ten thousand rows are long."""
     words = Words(settings.language)
-    curves = (row.curve for row in rows if row.curve and row.usable)
-    unit = suited((v for curve in curves for v in curve.tangent), "N m²", decimal=words.decimal)
+    means = [float(np.mean(row.curve.tangent)) for row in rows if row.curve and row.usable]
+    unit = suited((float(np.median(means)) if means else 0.0,), "N m²", decimal=words.decimal)
     count = {status: sum(row.status == status for row in rows) for status in STATUSES}
     unusable = sum(row.state == "unusable" for row in rows)
     pooled = list(repeats(rows, unit, words))
@@ -157,7 +159,7 @@ DATA, CURVES = (f"\N{OBJECT REPLACEMENT CHARACTER}{i}\N{OBJECT REPLACEMENT CHARA
 
 
 def _verdict(row: IndexRow) -> str:
-    """What was found; a verdict on a model that nothing was measured with is none."""
+    """Verdict that the index shows: ``none`` where nothing was measured, ``fault`` where the data are not usable."""
     return {"unusable": "fault", "failed": "none"}.get(row.state, row.verdict)
 
 

@@ -35,17 +35,18 @@ def measured_map(result: Result) -> ResidualMap | None:
         return None
     branches = {step.step: step.branch for step in result.steps}
     grid = np.linspace(0.0, max(p.s_m[-1] for p in photos), 201)
-    rows: list[list[float | None]] = []
+    rows: dict[str, list[list[float | None]]] = {"shape_sigma": [], "shape_m": []}
     for photo in photos:
-        std = np.asarray(photo.shape_residual_std_m)
-        sigma = np.divide(photo.shape_residual_m, std, out=np.full(std.size, np.nan), where=(std > 0.0) & photo.seen)
-        row = np.interp(grid, photo.s_m, sigma, left=np.nan, right=np.nan)
-        rows.append([float(v) if np.isfinite(v) else None for v in row])
+        std, left = np.asarray(photo.shape_residual_std_m), np.where(photo.seen, photo.shape_residual_m, np.nan)
+        sigma = np.divide(left, std, out=np.full(std.size, np.nan), where=std > 0.0)
+        for table, values in zip(rows.values(), (sigma, left), strict=True):
+            row = np.interp(grid, photo.s_m, values, left=np.nan, right=np.nan)
+            table.append([float(v) if np.isfinite(v) else None for v in row])
     return ResidualMap(
         s_m=grid.tolist(),
         steps=[p.step for p in photos],
         branches=[branches.get(p.step, "") for p in photos],
-        shape_sigma=rows,
+        **rows,
     )
 
 
@@ -63,14 +64,13 @@ def photos_of_answer(result: Result) -> list[PhotoPart]:
     residuals = answer_map(result)
     if residuals is None or result.answer.method != "extended":
         return result.photos
-    rows = dict(zip(residuals.steps, residuals.shape_sigma, strict=True))
+    rows = dict(zip(residuals.steps, residuals.shape_m, strict=False))
     return [_left_by(photo, residuals.s_m, rows.get(photo.step, [])) for photo in result.photos]
 
 
-def _left_by(photo: PhotoPart, s_m: list[float], sigma: list[float | None]) -> PhotoPart:
-    std = photo.shape_residual_std_m
-    known = len(std) == len(photo.s_m) and any(value is not None for value in sigma)
-    left = np.nan_to_num(np.interp(photo.s_m, s_m, _numbers(sigma)) * std).tolist() if known else []
+def _left_by(photo: PhotoPart, s_m: list[float], left_m: list[float | None]) -> PhotoPart:
+    known = any(value is not None for value in left_m)
+    left = np.nan_to_num(np.interp(photo.s_m, s_m, _numbers(left_m))).tolist() if known else []
     return photo.model_copy(update={"kappa_fit_per_m": [], "shape_residual_m": left})
 
 

@@ -157,7 +157,8 @@ def answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
         for title, key in (("use_equivalent", "equivalent"), ("use_radius", "radius")):
             if use.get(key):
                 sheet.text(f"{words(title)}: {use[key]}")
-    list_troubles(sheet, [finding for finding in result.findings if finding.level != "info"], words)
+    levels = ("error", "warning")
+    list_troubles(sheet, [finding for level in levels for finding in result.findings if finding.level == level], words)
     return sheet
 
 

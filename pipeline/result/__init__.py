@@ -8,79 +8,43 @@ over.
 
 from __future__ import annotations
 
-from pipeline.result.answer import Answer, curves, leading, none_of_its_type, set_aside, trusted
-from pipeline.result.diagnosed import (
-    BlindSpot,
-    CauseForm,
-    CausePart,
-    CauseRow,
-    DiagnosisPart,
-    ForceCorrectionPart,
-    GainPart,
-    HypothesisPart,
-    LeftoverPart,
-    NextExperiment,
-    ResidualMap,
-    TwinPart,
-)
-from pipeline.result.files import from_json, read_result, schema, to_json
-from pipeline.result.parts import (
-    AgreementPart,
-    BalancePart,
-    Curve,
-    FindingPart,
-    InversePart,
-    KnotPart,
-    MisfitPart,
-    PhotoPart,
-    PointwisePart,
-    PreviewPart,
-    ScalePart,
-    SpecimenPart,
-    StepPart,
-    Widening,
-)
-from pipeline.result.visited import Visited, visited
-from pipeline.result.whole import Result
-
-__all__ = [
-    "AgreementPart",
-    "Answer",
-    "BalancePart",
-    "BlindSpot",
-    "CauseForm",
-    "CausePart",
-    "CauseRow",
-    "Curve",
-    "DiagnosisPart",
-    "FindingPart",
-    "ForceCorrectionPart",
-    "GainPart",
-    "HypothesisPart",
-    "InversePart",
-    "KnotPart",
-    "LeftoverPart",
-    "MisfitPart",
-    "NextExperiment",
-    "PhotoPart",
-    "PointwisePart",
-    "PreviewPart",
-    "ResidualMap",
-    "Result",
-    "ScalePart",
-    "SpecimenPart",
-    "StepPart",
-    "TwinPart",
-    "Visited",
-    "Widening",
-    "curves",
-    "from_json",
-    "leading",
-    "none_of_its_type",
-    "read_result",
-    "schema",
-    "set_aside",
-    "to_json",
-    "trusted",
-    "visited",
-]
+from pipeline.result.answer import Answer as Answer
+from pipeline.result.answer import curves as curves
+from pipeline.result.answer import leading as leading
+from pipeline.result.answer import none_of_its_type as none_of_its_type
+from pipeline.result.answer import set_aside as set_aside
+from pipeline.result.answer import trusted as trusted
+from pipeline.result.diagnosed import BlindSpot as BlindSpot
+from pipeline.result.diagnosed import CauseForm as CauseForm
+from pipeline.result.diagnosed import CausePart as CausePart
+from pipeline.result.diagnosed import CauseRow as CauseRow
+from pipeline.result.diagnosed import DiagnosisPart as DiagnosisPart
+from pipeline.result.diagnosed import ForceCorrectionPart as ForceCorrectionPart
+from pipeline.result.diagnosed import GainPart as GainPart
+from pipeline.result.diagnosed import HypothesisPart as HypothesisPart
+from pipeline.result.diagnosed import LeftoverPart as LeftoverPart
+from pipeline.result.diagnosed import NextExperiment as NextExperiment
+from pipeline.result.diagnosed import ResidualMap as ResidualMap
+from pipeline.result.diagnosed import TwinPart as TwinPart
+from pipeline.result.files import from_json as from_json
+from pipeline.result.files import read_result as read_result
+from pipeline.result.files import schema as schema
+from pipeline.result.files import to_json as to_json
+from pipeline.result.parts import AgreementPart as AgreementPart
+from pipeline.result.parts import BalancePart as BalancePart
+from pipeline.result.parts import Curve as Curve
+from pipeline.result.parts import FindingPart as FindingPart
+from pipeline.result.parts import InversePart as InversePart
+from pipeline.result.parts import KnotPart as KnotPart
+from pipeline.result.parts import MisfitPart as MisfitPart
+from pipeline.result.parts import PhotoPart as PhotoPart
+from pipeline.result.parts import PointwisePart as PointwisePart
+from pipeline.result.parts import PreviewPart as PreviewPart
+from pipeline.result.parts import ScalePart as ScalePart
+from pipeline.result.parts import SpecimenPart as SpecimenPart
+from pipeline.result.parts import StepPart as StepPart
+from pipeline.result.parts import Widening as Widening
+from pipeline.result.visited import Visited as Visited
+from pipeline.result.visited import visited as visited
+from pipeline.result.whole import SCHEMA as SCHEMA
+from pipeline.result.whole import Result as Result

@@ -128,9 +128,6 @@ class PhotoPart(SaidPart):
     kappa_fit_per_m: Floats = Field([], description="curvature of the fitted simulation at s_m, 1/m")
     shape_residual_m: Floats = Field([], description="measured minus simulated position along the normal at s_m, m")
     shape_residual_std_m: Floats = Field([], description="its standard deviation, m: photo noise, correlated")
-    quality: dict[str, Number] = Field(
-        {}, description="how well the photo could be used: contrast_to_noise and the like, plain numbers"
-    )
     preview: PreviewPart | None = Field(None, description="reduced picture, sizes in px; null if it cannot be read")
 
     @model_validator(mode="after")

@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class IdentifySettings(BaseModel):
-    """Thresholds of ``identify``: both ways to the characteristic and their comparison."""
+    """How well the rig is known: what ``identify`` weighs forces, displacements and bearing axes by."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -30,28 +30,4 @@ class IdentifySettings(BaseModel):
         ge=0,
         description="m; of the point below the camera about the picture's middle: 3 degrees off plumb at a metre, or a "
         "photo that was cut",
-    )
-    agreement_level: float = Field(0.05, gt=0, lt=1, description="level of the test whether both ways agree")
-    pre_curvature_sigma: float = Field(
-        3.5, gt=0, description="standard deviations; K0 from photo, balance and inverse: three pairs, one false in 700"
-    )
-    chord_sigma: float = Field(
-        4.0,
-        gt=0,
-        description="standard deviations; chord against displacement: a false one in 2,000 tests of eight steps",
-    )
-    nuisance_sigma: float = Field(
-        3.5, gt=0, description="standard deviations; fitted length or scale against what was told"
-    )
-    misfit_level: float = Field(
-        1e-4,
-        gt=0,
-        lt=1,
-        description="probability; below it residuals count as beyond noise: rare even over many photos",
-    )
-    force_zero_sigma: float = Field(
-        4.0, gt=0, description="standard deviations; force of the force-free step against 0"
-    )
-    branch_level: float = Field(
-        0.01, gt=0, lt=1, description="level of the test whether loading and unloading show the same characteristic"
     )

@@ -23,8 +23,7 @@ class IntakeSettings(BaseModel):
     photo_max_bytes: int = Field(
         800_000_000,
         gt=0,
-        description="bytes; 120 Mpx of 16-bit colour are 720 MB; as vision.photo.max_file_megabytes, for photos "
-        "measured without a folder",
+        description="bytes; a larger photo is refused unread: 120 Mpx of 16-bit colour are 720 MB",
     )
     photos_max: int = Field(10_000, gt=0, description="photos in one folder; a test has tens of steps")
     steps_max: int = Field(10_000, gt=0, description="steps in one force log; as many as photos")

@@ -89,13 +89,8 @@ def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) 
     """
     name = path.name if name is None else name
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):  # opening a pipe would wait for whoever writes into it
+        if not stat.S_ISREG(path.stat().st_mode):  # opening a pipe would wait for whoever writes into it
             raise OSError(errno.EINVAL, "it is no ordinary file")
-        megabytes = status.st_size / 1e6
-        if megabytes > settings.max_file_megabytes:
-            said = Message("photo/too-large", megabytes=megabytes, limit=settings.max_file_megabytes)
-            return Rejected(name, said)
         # OpenCV opens paths in the system's code page on Windows; bytes work everywhere.
         data = path.read_bytes()
     except OSError as error:

@@ -76,6 +76,12 @@ def test_plastic_set_moves_the_rest_curvature_by_rate_times_excess() -> None:
     assert late[1:] == pytest.approx(1e-3 * (np.r_[6.0, back] - (2.0 + rate * 2.5)), rel=1e-12, abs=1e-15)
 
 
+def test_a_set_that_slows_down_is_one_at_any_trial_curvature() -> None:
+    slows = replace(section(plastic_rate=0.1), set_saturation=0.3)
+    m, tangent = slows.response(Memory(*slows.virgin(), 0.0, 0.0))(np.array([-4000.0]))  # iterations may stray as far
+    assert np.isfinite(m).all() and np.isfinite(tangent).all()
+
+
 @pytest.mark.parametrize("abscissa", ["curvature", "excess"])
 def test_set_either_takes_the_law_along_or_leaves_it(abscissa: str) -> None:
     law, K0, p = replace(FALLING, abscissa=abscissa), 2.0, 0.1 * 4.0

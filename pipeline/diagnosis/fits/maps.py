@@ -1,6 +1,7 @@
 """Residuals for people: a map over arc length and step, in sigma and in m; forces in N; chords in m.
 
-The shape residual of a photo is measured minus simulated position along the normal. On the map it is averaged over a
+The shape residual of a photo is measured minus simulated position along the normal, less what the errors of its own
+bearing axes make of it. On the map it is averaged over a
 few points along the cable, and its sigma is that of the average, correlation along s included; so an honest model shows
 values within about 2.
 """
@@ -18,6 +19,7 @@ from scipy import linalg
 from rod.inverse.fit import Fit
 from rod.inverse.noise import section_covariance
 from rod.inverse.observation import KINDS, Observation, normal_distance
+from rod.inverse.photo_fit import photo_fit
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
@@ -65,7 +67,7 @@ def residual_map(test: MeasuredTest, observation: Observation, fitted: Fit) -> d
         chord = photo.chord - float(prediction.chord[i])
         table["chord_m"].append(chord)
         table["chord_sigma"].append(chord / photo.chord_std)
-        across = normal_distance(photo.sections, prediction, i)
+        across = photo_fit(observation, fitted, photo, photo.sections).distance
         covariance = section_covariance(
             photo.sections, factor=observation.photo_noise.factor, stretch=observation.photo_noise.stretch
         )

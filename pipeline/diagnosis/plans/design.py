@@ -21,7 +21,7 @@ from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.posterior.detectable import Detectable, detectable
 from pipeline.diagnosis.posterior.weigh import error_models
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
-from pipeline.messages import DECIMAL, Message, ended, entry, word
+from pipeline.messages import DECIMAL, PER, Message, ended, entry, word
 from pipeline.result import Curve
 from pipeline.result.visited import html_table
 from pipeline.rounding import plain
@@ -111,10 +111,10 @@ class CausePlan:
 
     def told(self, language: str = "en") -> tuple[str, ...]:
         """Name, amount from which it shows, plausible amount, whether that shows, how far f_EI is off then."""
-        decimal = DECIMAL[language]
+        decimal, unit = DECIMAL[language], self.unit.replace(" per ", PER[language])
         never, seen = (word(name).said(language) for name in ("never", "yes" if self.visible else "no"))
         least, likely = (
-            never if size is None else amount_unit(self.unit, size, decimal=decimal).plain(size, 2)
+            never if size is None else amount_unit(unit, size, decimal=decimal).plain(size, 2)
             for size in (self.minimal_detectable, self.plausible)
         )
         off = plain(100.0 * self.stiffness_bias_at_plausible_size, 2, decimal=decimal)

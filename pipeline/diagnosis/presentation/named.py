@@ -51,7 +51,8 @@ def _classes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
         parts.append(
             CausePart(
                 name=kind.name,
-                **{"class": [catalogue[k].name for k in names]},
+                # a name that was found itself cannot stand in the place of another
+                **{"class": [catalogue[k].name for k in names if k == cause or k not in accepted.causes]},
                 probability=conclusion.posterior.of(cause),
                 estimate=amount,
                 std=std,

@@ -13,9 +13,6 @@ class PhotoSettings(StageSettings):
     max_megapixels: float = Field(
         120.0, gt=0, description="Mpx; a larger photo is refused before decoding: 12 bytes a pixel would pass 1.5 GB"
     )
-    max_file_megabytes: float = Field(
-        800.0, gt=0, description="MB; a larger file is refused unread: 120 Mpx of 16-bit colour are 720 MB"
-    )
     min_side_px: int = Field(32, ge=1, description="px; a smaller picture shows no cable of five widths and its ground")
 
 

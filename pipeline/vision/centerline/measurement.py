@@ -9,8 +9,7 @@ is mirrored or not.
 
 Under the bearing covers nothing is seen; there the curve is continued to the axes as far as they are known
 (`pipeline.vision.centerline.continuation`), its uncertainty grows and the points are marked as not seen. What a series
-tells of its axes comes in between: `follow_cable` on each photo, then `centerline_of` what was followed. By how much
-the curve of the seen part alone misses the axes is a figure of quality.
+tells of its axes comes in between: `follow_cable` on each photo, then `centerline_of` what was followed.
 """
 
 from __future__ import annotations
@@ -241,8 +240,7 @@ def centerline_of(
         return useless
     own_std = length_std(fit, s, shape.basis_normal, covariance)
     uv = chord.to_pixels(np.column_stack([shape.x, shape.y]))
-    used = fit.weight > 0.0
-    quality = _quality(sections, fit, metres, used) | {"axis_distance_px": float(misses.max() / metres)}
+    quality = _quality(sections, fit, metres)
     if followed.diameter_m is not None:
         quality["width_over_diameter"] = middle / followed.diameter_m
     return Centerline(
@@ -317,18 +315,10 @@ def _shape(
     )
 
 
-def _quality(sections: Sections, fit: CurveFit, metres: float, used: NDArray[np.bool_]) -> dict[str, float]:
+def _quality(sections: Sections, fit: CurveFit, metres: float) -> dict[str, float]:
     return {
         "contrast_to_noise": sections.contrast / max(sections.noise, 1e-9),
-        "noise": sections.noise,
         "blur_px": sections.blur,
-        "edge_asymmetry": sections.asymmetry,
         "section_std_px": median(fit.std) / metres * fit.smooth.sigma,
-        "noise_scale": fit.smooth.sigma,
-        "correlation_px": fit.smooth.correlation_length / metres,
         "systematic_px": sections.systematic_std,
-        "measured_share": sections.share,
-        "rejected_sections": float(np.mean(~used)),
-        "effective_parameters": fit.smooth.freedom,
-        "width_scatter": middle_width(sections.width)[1],
     }

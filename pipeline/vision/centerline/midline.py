@@ -105,8 +105,6 @@ class Sections:
         Median step and scatter of pixels, grey; median edge blur, px.
     softest : px
         Blur where it is most, of the sharper edge there: a shadow softens one edge, focus and motion both.
-    asymmetry : float
-        Relative difference of the two edges' contrast.
     """
 
     s: Array
@@ -121,7 +119,6 @@ class Sections:
     noise: float
     blur: float
     softest: float
-    asymmetry: float
 
 
 def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cover, ...]) -> NDArray[np.bool_]:
@@ -188,7 +185,6 @@ def measure_sections(
         noise=median(profiles.noise),
         blur=median(profiles.blur),
         softest=float(profiles.blur.min(axis=0).max()),
-        asymmetry=_asymmetry(step),
     )
 
 

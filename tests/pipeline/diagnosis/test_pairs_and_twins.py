@@ -1,6 +1,10 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.presentation.named import named_causes
 from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.score import score
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
@@ -45,3 +49,14 @@ def test_nearest_twin():
     index, closeness = nearest(table)
     assert index.tolist() == [1, 0, 1]
     assert closeness[2] == pytest.approx(np.cos(np.radians(50.0)))
+
+
+def test_of_two_causes_none_is_said_to_be_perhaps_the_other():
+    slips, tilts, drifts = 3, 18, 13
+    both = SimpleNamespace(causes=(slips, tilts), amount=lambda kind: (1.0, 0.1))
+    places = ((slips,), (tilts, slips, drifts))  # that only one of them acts is a hypothesis of its own
+    found = SimpleNamespace(
+        accepted=both, classes=places, posterior=SimpleNamespace(of=lambda k: 0.7), unmodelled=False
+    )
+    parts = named_causes(SimpleNamespace(suspicion=SimpleNamespace(causes=CATALOGUE)), found, None, None)
+    assert [part.class_ for part in parts] == [[CATALOGUE[slips].name], [CATALOGUE[k].name for k in (tilts, drifts)]]

@@ -5,7 +5,7 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
-from fixtures.hidden import SIX, THREE, hidden_test
+from fixtures.hidden import SIX, THREE, Reading, hidden_test
 from fixtures.laws.measured import Trial as LawTrial
 from fixtures.photographed.specimen import Order, make, write
 from fixtures.photographed.trial import answer
@@ -13,6 +13,7 @@ from fixtures.trials import Trial, made
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.fits import workbench
 from pipeline.diagnosis.fits.extended import curve_change
+from pipeline.diagnosis.fits.maps import residual_map
 from pipeline.faults import faults_of_input
 from pipeline.result import Curve
 from pipeline.run import measure
@@ -97,3 +98,13 @@ def test_three_photos_without_a_force_free_one_leave_the_false_valley_of_pre_cur
     # with K0 at -0.7 1/m for 0.86 and a law that rises from rest: 22.6 % off, 77 % of it in the band
     assert found["f_error"] < 0.03
     assert found["f_covered"] > 0.9
+
+
+def test_errors_of_the_bearing_axes_are_no_pattern_of_what_is_left():
+    """A pixel turns and shifts all of a midline: cells were 23 standard deviations off where chi-square saw noise."""
+    test = hidden_test(Cable(), SIX, largest=LARGEST, seed=5, reading=Reading(axis_px=1.0))
+    bench = workbench.prepare(faults_of_input(test), SETTINGS)
+    assert isinstance(bench, workbench.Workbench), bench
+    left = residual_map(bench.test, bench.observation, bench.base)
+    assert left["chi2"]["shape"] < 1.2 * left["data"]["shape"]
+    assert np.sqrt(np.nanmean(np.array(left["shape_sigma"], dtype=float) ** 2)) < 1.5

@@ -152,9 +152,9 @@ def test_what_is_at_fault_is_left_out_of_both_ways(measured, settings, law):
     assert "identify/misfit-force" not in codes(again.findings)
 
 
-def test_a_load_cell_off_zero_is_told(measured, settings):
+def test_a_load_cell_off_zero_is_told(measured):
     off = with_steps(measured, lambda s: replace(s, force=s.force + 20 * s.force_std))
-    assert codes(force_findings(off, settings)) == {"identify/force-zero"}
+    assert codes(force_findings(off)) == {"identify/force-zero"}
 
 
 def test_tension_ends_in_outcomes_not_in_a_crash(measured, settings):

@@ -84,6 +84,9 @@ def test_doubled_photos_are_told(specimen_folder):
     assert folder.message("photo/doubled") == told
     twice = specimen_folder(log=(folder.path / "force.csv").read_text().replace("step_2.png", "step_1.png"), name="b")
     assert "photo/doubled" in twice.codes()
+    for name in ("step_0", "step_1", "step_2"):
+        folder.write(f"images/{name}.png", b"")
+    assert "photo/doubled" not in folder.codes()  # none of them is a picture
 
 
 @pytest.mark.parametrize(

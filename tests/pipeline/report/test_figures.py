@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.canvas import style
 from pipeline.report.evidence import mechanics_figures
-from pipeline.report.figures import draw_pointwise, stiffness_unit
+from pipeline.report.figures import draw_moment, draw_pointwise, stiffness_unit
 from pipeline.report.words import Words
 from pipeline.settings import ReportSettings
 
@@ -21,6 +21,16 @@ def test_a_stiffness_below_zero_stays_in_the_picture(full_result):
     with style():
         axes = draw_pointwise(Figure(figsize=(6, 4), dpi=72), result, Words(), ReportSettings())
     assert axes.get_ylim()[0] == pytest.approx(stiffness_unit(result, Words()).factor * lowest)
+
+
+def test_a_stray_point_of_a_photo_does_not_shrink_the_moment_curve(full_result):
+    balance = full_result.balance
+    stray = {"points_kappa_per_m": [*balance.points_kappa_per_m, 70.0]}
+    stray |= {"points_moment_Nm": [*balance.points_moment_Nm, 0.0]}
+    result = full_result.model_copy(update={"balance": balance.model_copy(update=stray)})
+    with style():
+        axes = draw_moment(Figure(figsize=(6, 4), dpi=72), result, Words(), ReportSettings())
+    assert axes.get_xlim()[1] < 1.2 * full_result.inverse.curve.kappa_per_m[-1]
 
 
 @pytest.mark.parametrize("unvisited", [("unloading",), ("loading", "unloading")], ids=" and ".join)

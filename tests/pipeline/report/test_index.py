@@ -113,6 +113,15 @@ def test_no_head_of_a_column_breaks_within_a_unit(batch, tmp_path):
     assert page.count("[mN\N{NO-BREAK SPACE}m²]</button>") == 2
 
 
+def test_the_unit_suits_most_specimens_not_the_stiffest(full_result, tmp_path):
+    whole = full_result.inverse.curve
+    stiff = whole.model_copy(update={"tangent_Nm2": [300.0 * value for value in whole.tangent_Nm2]})
+    odd = full_result.model_copy(update={"inverse": full_result.inverse.model_copy(update={"curve": stiff})})
+    results = [named(full_result, "a"), named(full_result, "b"), named(odd, "c", kind="")]
+    page = write_index(results, tmp_path)[0].read_text(encoding="utf-8")
+    assert page.count("[mN\N{NO-BREAK SPACE}m²]</button>") == 2
+
+
 def test_types_are_offered_in_the_order_in_which_people_count(full_result, tmp_path):
     page = write_index([named(full_result, kind, kind) for kind in ("HV 10", "HV 9")], tmp_path)[0].read_text("utf-8")
     assert page.index('<option value="HV 9">') < page.index('<option value="HV 10">')

@@ -52,6 +52,9 @@ def diagnosis_of(verdict, photos):
             steps=[photo.step for photo in photos],
             branches=[STEPS[photo.step][1] for photo in photos],
             shape_sigma=rows,
+            shape_m=[
+                [3e-6 * sigma for sigma in row] for row in rows
+            ],  # a cell averages what the photo shows point by point
             force_sigma=[6.0 * size] * len(photos),
         ).model_dump()
 

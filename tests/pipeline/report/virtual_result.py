@@ -135,7 +135,6 @@ def traced(step, kappa_max, rng):
         kappa_fit_per_m=kappa.tolist(),
         shape_residual_m=residual.tolist(),
         shape_residual_std_m=np.full(s.size, 1.2e-5).tolist(),
-        quality={"contrast_to_noise": 41.0, "blur_px": 1.1},
         preview=PreviewPart(
             jpeg_base64=picture, width=size[0], height=size[1], reduction=REDUCTION, strip_base64=strip
         ),

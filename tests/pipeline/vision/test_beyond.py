@@ -154,7 +154,7 @@ def test_a_thing_eight_times_as_long_as_wide_is_no_cable():
     found = find_cable(Photo("thing.png", picture, 8))
     assert isinstance(found, Rejected)
     # drawn 25.4 px wide with round ends; its width is told to a pixel
-    assert found.figure["slenderness"] == pytest.approx((np.hypot(192.0, 40.0) + 25.4) / 25.4, rel=0.04)
+    assert found.said.values["slenderness"] == pytest.approx((np.hypot(192.0, 40.0) + 25.4) / 25.4, rel=0.04)
 
 
 @pytest.mark.parametrize("first", [40.0, 225.0])

@@ -121,7 +121,7 @@ def test_wrong_diameter_is_refused_with_the_figure(wrong):
     found = refused(rough_cable(scene, render(scene), rng), scene, diameter=wrong * DIAMETER)
     assert isinstance(found, Rejected)
     assert found.code == "photo/width"
-    assert_allclose(found.figure["width_over_diameter"], 1.0 / wrong, rtol=0.01)  # half a pixel of 55
+    assert_allclose(found.said.values["width_over_diameter"], 1.0 / wrong, rtol=0.01)  # half a pixel of 55
 
 
 def test_a_soft_cable_may_seem_narrower_by_its_blur():
@@ -259,7 +259,7 @@ def test_path_beside_the_cable_is_refused(seed):
     found = refused(replace(rough, path_px=rough.path_px + np.array([0.0, 4.0 * rough.half_width_px])), scene)
     # no edges are there: noise is not taken for them, nor for a bad outline
     assert isinstance(found, Rejected) and found.code == "photo/contrast"
-    assert found.figure["measured_share"] == 0.0
+    assert found.said.values["measured_share"] == 0.0
 
 
 @pytest.mark.parametrize("ground", [Ground("plain", (0.85,) * 3), Ground(cloth, (0.8,) * 3, 0.03)])

@@ -293,7 +293,7 @@ def test_unusable_photo_is_refused_with_its_reason(code: str, changes: dict[str,
     assert isinstance(outcome, Rejected)
     assert outcome.code == code
     assert outcome.image == "a.png" and len(outcome.reason) > 20
-    assert outcome.figure
+    assert outcome.said.values
 
 
 @pytest.mark.parametrize(
@@ -331,7 +331,9 @@ def test_wrong_diameter_is_refused_with_both_widths() -> None:
     assert isinstance(outcome, Rejected)
     assert outcome.code == "photo/width"
     # to a cell of the reduced photo, of which eight are to lie across the diameter that was given
-    assert outcome.figure["width_px"] / outcome.figure["diameter_px"] == pytest.approx(1.0 / 1.9, abs=1.0 / 8.0)
+    assert outcome.said.values["width_px"] / outcome.said.values["diameter_px"] == pytest.approx(
+        1.0 / 1.9, abs=1.0 / 8.0
+    )
 
 
 def test_empty_table_is_refused() -> None:

@@ -369,7 +369,7 @@ def test_real_photo_is_refused_with_the_reason(name: str, code: str, shared_data
     outcome = trace_photo(shared_data / "real" / "loop" / f"{name}.jpg")
     assert isinstance(outcome, Rejected)
     assert outcome.code == code
-    assert outcome.figure
+    assert outcome.said.values
     assert outcome.preview is not None
 
 
