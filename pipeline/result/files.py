@@ -1,19 +1,14 @@
-"""``result.json`` written, read back, and its schema.
-
-Version 1 kept the number of a plastic set's form in ``at``, and its name as the label; version 2 keeps in ``at`` how
-soon the set slows down. A result of version 1 is read by the labels of its forms, and refused where one is not known.
-"""
+"""``result.json`` written, read back, and its schema."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from pipeline.errors import InputError
-from pipeline.messages import Message, catalogue, word
+from pipeline.messages import Message
 from pipeline.result.diagnosed import CauseForm
 from pipeline.result.whole import SCHEMA, Result
 
@@ -22,7 +17,6 @@ LARGEST_BYTES = 256_000_000
 
 
 FAMILY = "cablebend/result/"
-EARLIER = FAMILY + "1"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -32,27 +26,19 @@ def to_json(result: Result) -> str:
 
 
 def from_json(text: str) -> Result:
-    """Read ``result.json`` back, also one of version 1.
-
-    Raises
-    ------
-    ValueError
-        For anything that is none, or that names no schema.
-    InputError
-        ``result/version`` if another version wrote it, in terms that are not known here.
-    """
-    try:
-        result = Result.model_validate_json(text)
-    except ValidationError as error:
-        other = _other_version(error)
-        if not other:
-            raise
-        if other != EARLIER:
-            raise InputError(Message("result/version", other=other, own=SCHEMA)) from error
-        result = _of_earlier(Result.model_validate({**json.loads(text), "schema": SCHEMA}))
+    """Read ``result.json`` back; raises ``ValueError`` for anything that is none, or that names no schema."""
+    result = Result.model_validate_json(text)
     if "schema_" not in result.model_fields_set:
         raise ValueError("it names no schema")
+    for cause in [] if result.diagnosis is None else result.diagnosis.causes:
+        if cause.name == "plastic_set":
+            cause.forms[:] = [_set_without_number(form) for form in cause.forms]
     return result
+
+
+def _set_without_number(form: CauseForm) -> CauseForm:
+    """The form of a plastic set; ``at`` once was its number, which the label says, and is how soon it slows down."""
+    return form if "at" in form.tuned else form.model_copy(update={"at": 0.0})
 
 
 def read_result(path: Path | str) -> Result:
@@ -68,34 +54,17 @@ def read_result(path: Path | str) -> Result:
         if file.stat().st_size > LARGEST_BYTES:
             raise ValueError(f"larger than {LARGEST_BYTES / 1e6:.0f} MB")
         return from_json(file.read_text(encoding="utf-8"))
-    except InputError as error:
-        raise InputError(error.said, path=file) from error
     except (OSError, ValueError, RecursionError, MemoryError) as error:
+        other = _other_version(error)
+        if other:
+            raise InputError(Message("result/version", other=other, own=SCHEMA), path=file) from error
         raise InputError(Message("result/unreadable", why=_told(error)), path=file) from error
 
 
-def _of_earlier(result: Result) -> Result:
-    """A result of version 1 in the terms of this one; raises `InputError` where it has a form nobody knows."""
-    if result.diagnosis is None:
-        return result
-    causes = [
-        cause.model_copy(update={"forms": [_form_of_earlier(cause.name, form) for form in cause.forms]})
-        for cause in result.diagnosis.causes
-    ]
-    return result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"causes": causes})})
-
-
-def _form_of_earlier(cause: str, form: CauseForm) -> CauseForm:
-    """A form of version 1 in the terms of this one; a plastic set has none without a label."""
-    known = f"form.{cause}.{form.label}" in catalogue("en")
-    if not known and (form.label or cause == "plastic_set"):
-        raise InputError(Message("result/version.form", other=EARLIER, cause=word(cause), form=form.label))
-    return form.model_copy(update={"at": 0.0}) if cause == "plastic_set" and "at" not in form.tuned else form
-
-
-def _other_version(error: ValidationError) -> str:
+def _other_version(error: Exception) -> str:
     """The schema that a result of another version names; empty if that is not what is wrong."""
-    named = next((one["input"] for one in error.errors() if one["loc"] == ("schema",)), None)
+    wrong = error.errors() if isinstance(error, ValidationError) else []
+    named = next((one["input"] for one in wrong if one["loc"] == ("schema",)), None)
     return named if isinstance(named, str) and named.startswith(FAMILY) else ""
 
 

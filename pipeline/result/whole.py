@@ -22,13 +22,13 @@ from pipeline.result.parts import (
 )
 from pipeline.result.visited import html_table
 
-SCHEMA: Literal["cablebend/result/2"] = "cablebend/result/2"
+SCHEMA: Literal["cablebend/result/1"] = "cablebend/result/1"
 
 
 class Result(Part):
     """Everything measured on one specimen."""
 
-    schema_: Annotated[Literal["cablebend/result/2"], Field(alias="schema", description="what this file is")] = SCHEMA
+    schema_: Annotated[Literal["cablebend/result/1"], Field(alias="schema", description="what this file is")] = SCHEMA
     status: Literal["measured", "partial", "failed"] = Field(
         description="measured: the simulation was fitted; partial: only the balance equations answer; failed: none does"
     )

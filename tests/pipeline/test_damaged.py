@@ -40,7 +40,7 @@ DAMAGE = {
     "short list": lambda _, d: changed(d, *CURVE, "tangent_Nm2", value=[0.02]),
     "no order": lambda _, d: changed(d, *CURVE, "kappa_per_m", 3, value=-5.0),
     "short photo": lambda _, d: changed(d, "photos", 2, "x_m", value=[0.0]),
-    "50 MB": lambda text, _: '{"schema": "cablebend/result/2", "status": "' + 50_000_000 * "x" + '"}',
+    "50 MB": lambda text, _: '{"schema": "cablebend/result/1", "status": "' + 50_000_000 * "x" + '"}',
 }
 
 
