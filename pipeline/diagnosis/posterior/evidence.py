@@ -25,6 +25,7 @@ Source: MacKay (1992), Bayesian interpolation, eqs. 2.4 and 2.5; the size of an 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,10 @@ from pipeline.diagnosis.posterior.unknowns import (
     conditional,
     log_sum,
     mean_over_laws,
+    solved_alone,
     solved_for,
+    solved_once,
+    with_columns,
 )
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
@@ -81,11 +85,12 @@ def evidence(
     grid: ErrorGrid, fitted: Fit, terms: Sequence[Term] = (), columns: Array | None = None
 ) -> tuple[Evidence, WithColumn]:
     """Evidence of a fit, and of the fit with each of some further columns; see `evidences`."""
-    return evidences(grid, fitted, fitted.residual[:, None], terms, columns)[0]
+    solved = solved_once(grid, fitted) if columns is None else with_columns(grid, fitted, columns)
+    return _summed(grid, fitted, terms, solved)[0]
 
 
 def evidences(
-    grid: ErrorGrid, fitted: Fit, residuals: Array, terms: Sequence[Term] = (), columns: Array | None = None
+    grid: ErrorGrid, fitted: Fit, residuals: Array, terms: Sequence[Term], columns: Array
 ) -> list[tuple[Evidence, WithColumn]]:
     """Evidence of one linear model for several residuals, and of it with each of some further columns.
 
@@ -98,11 +103,14 @@ def evidences(
         Whitened, prior rows last.
     terms : (k,) of Term
         What the columns are.
-    columns : (N, k) or None
+    columns : (N, k)
         Whitened traces per unit of amount.
     """
-    more = np.zeros((len(residuals), 0)) if columns is None else columns
-    solved = solved_for(grid, fitted, more, residuals)
+    return _summed(grid, fitted, terms, solved_for(grid, fitted, columns, residuals))
+
+
+def _summed(grid: ErrorGrid, fitted: Fit, terms: Sequence[Term], solved: Solved) -> list[tuple[Evidence, WithColumn]]:
+    """Evidence for each residual, over all priors of the law and all error models."""
     by_law = solved.flat + _amounts(fitted, solved)
     prior, rest = solved.products.log_prior, solved.products.rest
     posterior = mean_over_laws(by_law) + prior[:, None]
@@ -121,7 +129,7 @@ def evidences(
 
 def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
     """What beside a fit is likeliest to be something else, as whitened rows (n,) of the data."""
-    solved = solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+    solved = solved_alone(grid, fitted)
     weight = np.where(solved.products.rest, mean_over_laws(solved.flat)[:, 0] + solved.products.log_prior, -np.inf)
     best = int(np.argmax(weight))
     data, (residual, jacobian) = len(grid.photos) + len(grid.forces), fitted.as_logged
@@ -147,7 +155,19 @@ class Moments(NamedTuple):
 
 def moments(grid: ErrorGrid, fitted: Fit, *, negligible: float) -> Moments:
     """Mean and covariance of a fit's unknowns under every error model of a weight above ``negligible``."""
-    solved = solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+    return _moments(solved_alone(grid, fitted), fitted, negligible)
+
+
+def as_told(grid: ErrorGrid, fitted: Fit) -> tuple[Array, Array]:
+    """Mean (p,) and covariance (p, p) of a fit's unknowns by data that are as wrong as they say."""
+    first = grid.kinds[0]
+    held, kind = next(iter(grid.hold.items())), first._replace(shapes=first.shapes[:1], pairs=first.pairs[:1])
+    stated = replace(grid, kinds=(kind,), hold=dict([held]))
+    found = _moments(solved_once(stated, fitted), fitted, negligible=1.0)
+    return found.move[0], found.covariance[0]
+
+
+def _moments(solved: Solved, fitted: Fit, negligible: float) -> Moments:
     by_law, rest = solved.flat + _amounts(fitted, solved), solved.products.rest
     log_weight = mean_over_laws(by_law)[:, 0] + solved.products.log_prior
     weight = np.zeros(len(rest))

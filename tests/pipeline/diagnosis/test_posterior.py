@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import norm
 
 from fixtures.continuum import Cable
@@ -143,28 +144,28 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
             precisions.append(precision)
             means.append(np.linalg.solve(precision, toward))
             norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * means[-1] @ toward)
-    models, found, dense = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((2, rows, 0))), [], []
+    models, found, logs = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((2, rows, 0))), [], []
     # displacements of a log that states what they scatter have priors of their own
     facts = replace(bench.facts, displacement_std=np.full(len(bench.facts.branch), SCATTER))
     extension = replace(bench.base.extension, facts=facts)
     fitted = replace(bench.base, extension=extension, vector=np.zeros(J.shape[1]), jacobian=np.vstack([J, weak]))
-    for seed in (3, 4):
-        drawn = np.random.default_rng(seed).standard_normal(rows)
-        residual = np.r_[drawn, np.zeros(len(J) - rows + len(weak))]
+    drawn = np.random.default_rng(3).standard_normal((rows, 2))
+    for column in drawn.T:
+        residual = np.r_[column, np.zeros(len(J) - rows + len(weak))]
         found.append(evidence(one, replace(fitted, residual=residual))[0].plain)
-        logs = []
-        for precision, mean, norm_of in zip(precisions, means, norms, strict=True):
-            spread = J[:rows] @ np.linalg.solve(precision, J[:rows].T)
-            for sizes, chance in zip(models.sizes, models.log_prior, strict=True):
-                logs.append(normal_log(drawn - J[:rows] @ mean, covariance(one, sizes) + spread) + chance + norm_of)
-        dense.append(np.logaddexp.reduce(logs))
+    wide = [(covariance(one, sizes), chance) for sizes, chance in zip(models.sizes, models.log_prior, strict=True)]
+    for precision, mean, norm_of in zip(precisions, means, norms, strict=True):
+        spread, apart = J[:rows] @ np.linalg.solve(precision, J[:rows].T), drawn - (J[:rows] @ mean)[:, None]
+        logs += [normal_log(apart, noise + spread) + chance + norm_of for noise, chance in wide]
+    dense = np.logaddexp.reduce(logs)
     assert found[1] - found[0] == pytest.approx(dense[1] - dense[0], abs=1e-3)
 
 
 def normal_log(drawn, covariance):
-    """Log density of a normal distribution about zero, but for its factors of 2 pi."""
-    root = np.linalg.cholesky(covariance)
-    return -0.5 * np.sum(np.linalg.solve(root, drawn) ** 2) - np.sum(np.log(np.diag(root)))
+    """Log densities (d,) of draws (n, d) by a normal distribution about zero, but for its factors of 2 pi."""
+    root = cholesky(covariance, lower=True, check_finite=False)
+    whitened = solve_triangular(root, drawn, lower=True, check_finite=False)
+    return -0.5 * np.sum(whitened**2, axis=0) - np.sum(np.log(np.diag(root)))
 
 
 def believed(bench, grid, field, seed):
