@@ -111,12 +111,10 @@ def evidences(
 
 def _summed(grid: ErrorGrid, fitted: Fit, terms: Sequence[Term], solved: Solved) -> list[tuple[Evidence, WithColumn]]:
     """Evidence for each residual, over all priors of the law and all error models."""
-    by_law = solved.flat + _amounts(fitted, solved)
-    prior, rest = solved.products.log_prior, solved.products.rest
-    posterior = mean_over_laws(by_law) + prior[:, None]
-    added = posterior[..., None] + _column_gain(fitted, terms, solved, by_law)
+    by_law = solved.flat + _amounts(fitted, solved) + solved.products.log_prior[:, None, None, None]
+    posterior, rest = mean_over_laws(by_law), solved.products.rest
     plain, disturbed = (_total(posterior[part]) for part in (~rest, rest))
-    further = [_total(added[part]) for part in (~rest, rest)]
+    further = _with_each(fitted, terms, solved, by_law)
     weight, scales = np.exp(posterior[~rest] - plain), solved.products.scales[~rest]
     found = []
     for k, one in enumerate(weight.T):
@@ -236,23 +234,27 @@ def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) 
     return np.asarray(log_sum(np.moveaxis(log, -1, 0)) - np.log(len(SIZES)))
 
 
-def _column_gain(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array) -> Array:
-    """Log of the factor (G, d, k) by which each further column changes p, over the priors of the law that matter."""
+def _with_each(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array) -> Array:
+    """Log p (2, d, k) with each further column, without and with something else: of the priors of the law that matter.
+
+    ``by_law`` (G, l, t, d): log p of each error model and prior of the law.
+    """
     several, (law, half) = by_law.shape[-1], _onto_law(solved)
     pulled = solved.products.cross[:, :several] - solved.pull.swapaxes(1, 2) @ half
-    share = by_law - mean_over_laws(by_law)[:, None, None] - np.log(by_law[0, ..., 0].size)
-    total = np.full((several, *solved.products.square.shape), -np.inf)
-    for number, weight in enumerate(share.transpose(1, 3, 0, 2)):
+    least = mean_over_laws(by_law) + np.log(by_law[0, ..., 0].size) - FEW
+    total = np.full((2, several, law.shape[2]), -np.inf)
+    for number, logs in enumerate(by_law.transpose(1, 3, 0, 2)):
         one, precision = solved.laws[number], told_of_columns(solved, number)
         along = one.vectors.swapaxes(1, 2) @ law
         for d in range(several):
-            told = weight[d] > -FEW
+            told = logs[d] > least[:, d, None]
             wide = 1.0 / precision[told]
             amount = (pulled[:, None, d] - one.moves[..., d] @ along)[told] * wide
-            gain = np.full(precision.shape, -np.inf)
-            gain[told] = weight[d][told][:, None] + _gains(fitted, terms, amount, wide)
-            total[d] = np.logaddexp(total[d], np.logaddexp.reduce(gain, axis=1))
-    return total.swapaxes(0, 1)
+            added = logs[d][told][:, None] + _gains(fitted, terms, amount, wide)
+            rest = solved.products.rest[np.nonzero(told)[0]]
+            for part, own in enumerate((~rest, rest)):
+                total[part, d] = np.logaddexp(total[part, d], _total(added[own]))
+    return total - np.log(by_law[0, ..., 0].size)
 
 
 def told_of_columns(solved: Solved, number: int) -> Array:
