@@ -38,9 +38,6 @@ POSSIBLE = 30.0
 DRAWS, BINS = 16, 24
 """Of noise, over which log weights are means; and of what the data tell of an amount."""
 
-CLOSE = 1e-5
-"""Of the largest amount tried: so exactly the smallest that is found is sought."""
-
 LINEAR = (0.02, 3.0)
 """Amounts within these multiples of where a trace was computed are taken as proportional."""
 
@@ -165,4 +162,4 @@ def found_at(weight: Array, told: Array, odds: float, most: float, plausible: fl
         gain = log_gain(np.full(told.shape, amount), 1.0 / told, plausible, sign)
         return float(log_sum(left + gain) - log_sum(left)) - odds
 
-    return np.inf if gained(most) < 0.0 else float(brentq(gained, 0.0, most, xtol=CLOSE * most))
+    return np.inf if gained(most) < 0.0 else float(brentq(gained, 0.0, most, xtol=1e-5 * most))

@@ -254,7 +254,7 @@ def _with_each(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array
             rest = solved.products.rest[np.nonzero(told)[0]]
             for part, own in enumerate((~rest, rest)):
                 total[part, d] = np.logaddexp(total[part, d], _total(added[own]))
-    return total - np.log(by_law[0, ..., 0].size)
+    return np.asarray(total - np.log(by_law[0, ..., 0].size))
 
 
 def told_of_columns(solved: Solved, number: int) -> Array:

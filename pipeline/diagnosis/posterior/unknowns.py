@@ -55,15 +55,13 @@ class Solved:
     covariance: Array
 
 
-@lru_cache(maxsize=1)
-def solved_alone(grid: ErrorGrid, fitted: Fit) -> Solved:
-    """The same for the residual of a fit, without further columns; the last is kept, that of the one that answers."""
-    return solved_once(grid, fitted)
-
-
 def solved_once(grid: ErrorGrid, fitted: Fit) -> Solved:
-    """The same, not kept for the next."""
+    """The unknowns of a fit for its own residual, without further columns."""
     return solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+
+
+solved_alone = lru_cache(maxsize=1)(solved_once)
+"""The same, kept until another fit is asked for: the one that answers is asked for several times."""
 
 
 def with_columns(grid: ErrorGrid, fitted: Fit, more: Array) -> Solved:
