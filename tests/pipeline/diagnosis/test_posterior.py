@@ -15,7 +15,7 @@ from fixtures.scores import SETTINGS, error_models, exact_bench
 from fixtures.trials import random_cable
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, MOVED, SHAPES, SLOW, hold_sizes
-from pipeline.diagnosis.posterior.evidence import SIZES, evidence, evidences
+from pipeline.diagnosis.posterior.evidence import SIZES, as_told, evidence, evidences, moments
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
 from pipeline.diagnosis.posterior.weigh import weighed_draws
 from pipeline.diagnosis.posterior.words import verdict
@@ -159,6 +159,12 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
         logs += [normal_log(apart, noise + spread) + chance + norm_of for noise, chance in wide]
     dense = np.logaddexp.reduce(logs)
     assert found[1] - found[0] == pytest.approx(dense[1] - dense[0], abs=1e-3)
+
+
+def test_data_as_wrong_as_they_say_are_the_first_of_all_error_models(bench, grid):
+    first, (move, told) = moments(grid, bench.base, negligible=1.0), as_told(grid, bench.base)
+    assert np.allclose(move, first.move[0], rtol=1e-9, atol=1e-12)
+    assert np.allclose(told, first.covariance[0], rtol=1e-9, atol=1e-12)
 
 
 def normal_log(drawn, covariance):
