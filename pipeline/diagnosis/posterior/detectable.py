@@ -162,4 +162,4 @@ def found_at(weight: Array, told: Array, odds: float, most: float, plausible: fl
         gain = log_gain(np.full(told.shape, amount), 1.0 / told, plausible, sign)
         return float(log_sum(left + gain) - log_sum(left)) - odds
 
-    return np.inf if gained(most) < 0.0 else float(brentq(gained, 0.0, most, xtol=1e-5 * most))
+    return np.inf if gained(most) < 0.0 else float(brentq(gained, 0.0, most))
