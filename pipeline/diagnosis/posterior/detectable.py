@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import logsumexp, ndtri
+from scipy.special import ndtri
 
 from pipeline.diagnosis.fits.search import TRACE, Suspicion, direction
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import log_gain, told_of_columns
 from pipeline.diagnosis.posterior.hypotheses import SHARES
-from pipeline.diagnosis.posterior.unknowns import solved_for
+from pipeline.diagnosis.posterior.unknowns import log_sum, solved_for
 from pipeline.diagnosis.statistics.score import span
 from rod.inverse.fit import Fit
 from rod.inverse.observation import Observation
@@ -140,7 +140,7 @@ def _told(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion) -> tuple[Array, Ar
     noise[:count] = np.random.default_rng(0).standard_normal((count, DRAWS))
     solved = solved_for(grid.plain, fitted, suspicion.columns, noise)
     log = solved.flat.mean(axis=-1) + solved.products.log_prior[:, None, None]
-    weight = np.exp(log - logsumexp(log)).ravel()
+    weight = np.exp(log.ravel() - log_sum(log.ravel()))
     told = np.stack([told_of_columns(solved, one) for one in range(len(solved.laws))], axis=1)
     told = np.log(told.reshape(weight.size, -1))
     low, high = told.min(axis=0), told.max(axis=0)
@@ -160,6 +160,6 @@ def found_at(weight: Array, told: Array, odds: float, most: float, plausible: fl
     def gained(amount: float) -> float:
         left = weight - 0.5 * amount**2 * told
         gain = log_gain(np.full(told.shape, amount), 1.0 / told, plausible, sign)
-        return float(logsumexp(left + gain) - logsumexp(left)) - odds
+        return float(log_sum(left + gain) - log_sum(left)) - odds
 
     return np.inf if gained(most) < 0.0 else float(brentq(gained, 0.0, most))

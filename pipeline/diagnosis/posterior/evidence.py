@@ -25,6 +25,7 @@ Source: MacKay (1992), Bayesian interpolation, eqs. 2.4 and 2.5; the size of an 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,10 @@ from pipeline.diagnosis.posterior.unknowns import (
     conditional,
     log_sum,
     mean_over_laws,
+    solved_alone,
     solved_for,
+    solved_once,
+    with_columns,
 )
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
@@ -81,11 +85,12 @@ def evidence(
     grid: ErrorGrid, fitted: Fit, terms: Sequence[Term] = (), columns: Array | None = None
 ) -> tuple[Evidence, WithColumn]:
     """Evidence of a fit, and of the fit with each of some further columns; see `evidences`."""
-    return evidences(grid, fitted, fitted.residual[:, None], terms, columns)[0]
+    solved = solved_once(grid, fitted) if columns is None else with_columns(grid, fitted, columns)
+    return _summed(grid, fitted, terms, solved)[0]
 
 
 def evidences(
-    grid: ErrorGrid, fitted: Fit, residuals: Array, terms: Sequence[Term] = (), columns: Array | None = None
+    grid: ErrorGrid, fitted: Fit, residuals: Array, terms: Sequence[Term], columns: Array
 ) -> list[tuple[Evidence, WithColumn]]:
     """Evidence of one linear model for several residuals, and of it with each of some further columns.
 
@@ -98,17 +103,18 @@ def evidences(
         Whitened, prior rows last.
     terms : (k,) of Term
         What the columns are.
-    columns : (N, k) or None
+    columns : (N, k)
         Whitened traces per unit of amount.
     """
-    more = np.zeros((len(residuals), 0)) if columns is None else columns
-    solved = solved_for(grid, fitted, more, residuals)
-    by_law = solved.flat + _amounts(fitted, solved)
-    prior, rest = solved.products.log_prior, solved.products.rest
-    posterior = mean_over_laws(by_law) + prior[:, None]
-    added = posterior[..., None] + _column_gain(fitted, terms, solved, by_law)
+    return _summed(grid, fitted, terms, solved_for(grid, fitted, columns, residuals))
+
+
+def _summed(grid: ErrorGrid, fitted: Fit, terms: Sequence[Term], solved: Solved) -> list[tuple[Evidence, WithColumn]]:
+    """Evidence for each residual, over all priors of the law and all error models."""
+    by_law = solved.flat + _amounts(fitted, solved) + solved.products.log_prior[:, None, None, None]
+    posterior, rest = mean_over_laws(by_law), solved.products.rest
     plain, disturbed = (_total(posterior[part]) for part in (~rest, rest))
-    further = [_total(added[part]) for part in (~rest, rest)]
+    further = _with_each(fitted, terms, solved, by_law)
     weight, scales = np.exp(posterior[~rest] - plain), solved.products.scales[~rest]
     found = []
     for k, one in enumerate(weight.T):
@@ -121,7 +127,7 @@ def evidences(
 
 def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
     """What beside a fit is likeliest to be something else, as whitened rows (n,) of the data."""
-    solved = solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+    solved = solved_alone(grid, fitted)
     weight = np.where(solved.products.rest, mean_over_laws(solved.flat)[:, 0] + solved.products.log_prior, -np.inf)
     best = int(np.argmax(weight))
     data, (residual, jacobian) = len(grid.photos) + len(grid.forces), fitted.as_logged
@@ -147,7 +153,19 @@ class Moments(NamedTuple):
 
 def moments(grid: ErrorGrid, fitted: Fit, *, negligible: float) -> Moments:
     """Mean and covariance of a fit's unknowns under every error model of a weight above ``negligible``."""
-    solved = solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+    return _moments(solved_alone(grid, fitted), fitted, negligible)
+
+
+def as_told(grid: ErrorGrid, fitted: Fit) -> tuple[Array, Array]:
+    """Mean (p,) and covariance (p, p) of a fit's unknowns by data that are as wrong as they say."""
+    first = grid.kinds[0]
+    held, kind = next(iter(grid.hold.items())), first._replace(shapes=first.shapes[:1], pairs=first.pairs[:1])
+    stated = replace(grid, kinds=(kind,), hold=dict([held]))
+    found = _moments(solved_once(stated, fitted), fitted, negligible=1.0)
+    return found.move[0], found.covariance[0]
+
+
+def _moments(solved: Solved, fitted: Fit, negligible: float) -> Moments:
     by_law, rest = solved.flat + _amounts(fitted, solved), solved.products.rest
     log_weight = mean_over_laws(by_law)[:, 0] + solved.products.log_prior
     weight = np.zeros(len(rest))
@@ -216,23 +234,27 @@ def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) 
     return np.asarray(log_sum(np.moveaxis(log, -1, 0)) - np.log(len(SIZES)))
 
 
-def _column_gain(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array) -> Array:
-    """Log of the factor (G, d, k) by which each further column changes p, over the priors of the law that matter."""
+def _with_each(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array) -> Array:
+    """Log p (2, d, k) with each further column, without and with something else: of the priors of the law that matter.
+
+    ``by_law`` (G, l, t, d): log p of each error model and prior of the law.
+    """
     several, (law, half) = by_law.shape[-1], _onto_law(solved)
     pulled = solved.products.cross[:, :several] - solved.pull.swapaxes(1, 2) @ half
-    share = by_law - mean_over_laws(by_law)[:, None, None] - np.log(by_law[0, ..., 0].size)
-    total = np.full((several, *solved.products.square.shape), -np.inf)
-    for number, weight in enumerate(share.transpose(1, 3, 0, 2)):
+    least = mean_over_laws(by_law) + np.log(by_law[0, ..., 0].size) - FEW
+    total = np.full((2, several, law.shape[2]), -np.inf)
+    for number, logs in enumerate(by_law.transpose(1, 3, 0, 2)):
         one, precision = solved.laws[number], told_of_columns(solved, number)
         along = one.vectors.swapaxes(1, 2) @ law
         for d in range(several):
-            told = weight[d] > -FEW
+            told = logs[d] > least[:, d, None]
             wide = 1.0 / precision[told]
             amount = (pulled[:, None, d] - one.moves[..., d] @ along)[told] * wide
-            gain = np.full(precision.shape, -np.inf)
-            gain[told] = weight[d][told][:, None] + _gains(fitted, terms, amount, wide)
-            total[d] = np.logaddexp(total[d], np.logaddexp.reduce(gain, axis=1))
-    return total.swapaxes(0, 1)
+            added = logs[d][told][:, None] + _gains(fitted, terms, amount, wide)
+            rest = solved.products.rest[np.nonzero(told)[0]]
+            for part, own in enumerate((~rest, rest)):
+                total[part, d] = np.logaddexp(total[part, d], _total(added[own]))
+    return np.asarray(total - np.log(by_law[0, ..., 0].size))
 
 
 def told_of_columns(solved: Solved, number: int) -> Array:

@@ -22,7 +22,7 @@ from scipy.special import log_ndtr, logsumexp, ndtr
 from pipeline.diagnosis.fits.extended import factor_of, stated
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
-from pipeline.diagnosis.posterior.evidence import SIZES, moments
+from pipeline.diagnosis.posterior.evidence import SIZES, as_told, moments
 from pipeline.diagnosis.posterior.hypotheses import LEVEL, Posterior
 from pipeline.result import Curve, Widening, visited
 from rod.inverse.fit import Fit
@@ -76,8 +76,8 @@ def widening(
     """
     nearest = own or base
     # what was stated is the mean over all priors of the law for data as wrong as they say
-    here, as_told = stated(nearest, centre.kappa), moments(grid.plain, nearest, negligible=1.0)
-    offset = centre.values - here.values - here.rows @ as_told.move[0]
+    here, (move, told) = stated(nearest, centre.kappa), as_told(grid, nearest)
+    offset = centre.values - here.values - here.rows @ move
     shifts = {(id(nearest), False): offset} | ({} if own is None else {(id(own), True): offset})
     parts = [
         *_refits(grid, posterior, base, centre, shifts),
@@ -88,7 +88,7 @@ def widening(
     variance = np.vstack([np.sum(part.root**2, axis=2) for part in parts])
     band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / NORMAL
     # the curve's own band stands for what the same data leave unknown of its law
-    known = np.einsum("np,pq,nq->n", here.rows, as_told.covariance[0], here.rows)
+    known = np.einsum("np,pq,nq->n", here.rows, told, here.rows)
     extra = np.sqrt(np.maximum(band**2 - known, 0.0))
     covariance = sum(_covariance(part) for part in parts)
     return _told(centre.kappa, extra, np.asarray(covariance) / weight.sum())
@@ -121,12 +121,12 @@ def _unfitted(
     grid: ErrorGrid, posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Centre, shift: Array
 ) -> _Parts:
     """Components of causes that the linear model alone weighed, each in its loudest form and any size beforehand."""
-    here, scores, known = stated(base, centre.kappa), suspicion.scores, moments(grid.plain, base, negligible=1.0)
+    here, scores, (move, known) = stated(base, centre.kappa), suspicion.scores, as_told(grid, base)
     unit = np.linalg.norm(base.jacobian, axis=0)
     unit = np.where(unit > 0.0, unit, 1.0)
     pseudo = np.linalg.pinv(base.jacobian / unit, rcond=1e-7) / unit[:, None]
-    own = here.rows @ factor_of(known.covariance[0])
-    about = here.values + here.rows @ known.move[0] + shift - centre.values
+    own = here.rows @ factor_of(known)
+    about = here.values + here.rows @ move + shift - centre.values
     weight, mean, root = [], [], []
     for one in posterior.believed:
         if one.found or len(one.causes) != 1 or one.something_else or one.probability < NEGLIGIBLE:

@@ -11,7 +11,8 @@ are left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +36,15 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 class Solved:
     """What the fit's own unknowns are for every error model: p of the law, then r others; l families of its prior.
 
-    The others are eliminated first: ``half`` (G, r, r), W with W' W the inverse of their information; ``across``
-    (G, r, p) and ``pull`` (G, r, d), W times their products with the law's and with b. Then the law's by each family,
-    see `rod.law_prior.Conditioned`. ``flat`` (G, l, t, d): log p flat in the amounts. ``amounts``: positions in the
-    vector of those that no prior row states, ``move`` (G, l, t, d, a) of these and ``covariance`` (G, l, t, a, a).
+    ``kept`` (G,): which of the grid's error models they are. The others are eliminated first: ``half`` (G, r, r), W
+    with W' W the inverse of their information; ``across`` (G, r, p) and ``pull`` (G, r, d), W times their products with
+    the law's and with b. Then the law's by each family, see `rod.law_prior.Conditioned`. ``flat`` (G, l, t, d): log p
+    flat in the amounts. ``amounts``: positions in the vector of those that no prior row states, ``move``
+    (G, l, t, d, a) of these and ``covariance`` (G, l, t, a, a).
     """
 
     products: Products
+    kept: NDArray[np.int_]
     half: Array
     across: Array
     pull: Array
@@ -50,6 +53,22 @@ class Solved:
     amounts: list[int]
     move: Array
     covariance: Array
+
+
+def solved_once(grid: ErrorGrid, fitted: Fit) -> Solved:
+    """The unknowns of a fit for its own residual, without further columns."""
+    return solved_for(grid, fitted, np.zeros((len(fitted.residual), 0)), fitted.residual[:, None])
+
+
+solved_alone = lru_cache(maxsize=1)(solved_once)
+"""The same, kept until another fit is asked for: the one that answers is asked for several times."""
+
+
+def with_columns(grid: ErrorGrid, fitted: Fit, more: Array) -> Solved:
+    """The same with further columns (N, k)."""
+    solved = solved_alone(grid, fitted)
+    products, _ = _products(grid, fitted, more, fitted.residual[:, None])
+    return replace(solved, products=products.at(solved.kept))
 
 
 def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> Solved:
@@ -78,7 +97,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
         moves.append(alone - np.einsum("gap,gtpd->gtda", along, one.moves))
         covariances.append(np.einsum("gap,gtp,gbp->gtab", along, 1.0 / one.precisions, along, optimize=True))
     covariance = np.stack(covariances, axis=1) + (own @ own.swapaxes(1, 2))[:, None, None]
-    return Solved(products, half, across, pull, laws, flat, amounts, np.stack(moves, axis=1), covariance)
+    return Solved(products, kept, half, across, pull, laws, flat, amounts, np.stack(moves, axis=1), covariance)
 
 
 def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tuple[Products, float]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.fits.search import Suspicion, ordinary
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
-from pipeline.diagnosis.posterior.evidence import Evidence, evidence, evidences
+from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence, evidences
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
 from rod.inverse.fit import Fit
@@ -44,13 +44,18 @@ def weighed(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion | None = None) ->
     """Evidence of a fit, and of every cause beside it that ``suspicion``, the scores about it, has forms of."""
     if suspicion is None or not suspicion.terms:
         return Weighed(evidence(grid, fitted)[0], {})
-    return weighed_draws(grid, fitted, suspicion, fitted.residual[:, None])[0]
+    return _of_causes(suspicion, [evidence(grid, fitted, suspicion.terms, suspicion.columns)])[0]
 
 
 def weighed_draws(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion, residuals: Array) -> list[Weighed]:
     """The same for several residuals (N, d) in the place of the fit's own."""
+    return _of_causes(suspicion, evidences(grid, fitted, residuals, suspicion.terms, suspicion.columns))
+
+
+def _of_causes(suspicion: Suspicion, found_of: list[tuple[Evidence, WithColumn]]) -> list[Weighed]:
+    """From forms to causes."""
     found = []
-    for own, added in evidences(grid, fitted, residuals, suspicion.terms, suspicion.columns):
+    for own, added in found_of:
         further = {}
         for cause in range(len(suspicion.causes)):
             forms = suspicion.of(cause)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import norm
 
 from fixtures.continuum import Cable
@@ -14,9 +15,9 @@ from fixtures.scores import SETTINGS, error_models, exact_bench
 from fixtures.trials import random_cable
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, MOVED, SHAPES, SLOW, hold_sizes
-from pipeline.diagnosis.posterior.evidence import SIZES, evidence, evidences
+from pipeline.diagnosis.posterior.evidence import SIZES, as_told, evidence, evidences, moments
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
-from pipeline.diagnosis.posterior.weigh import weighed
+from pipeline.diagnosis.posterior.weigh import weighed_draws
 from pipeline.diagnosis.posterior.words import verdict
 from pipeline.faults import faults_of_input
 from rod.inverse.noise import by_axes
@@ -143,48 +144,55 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
             precisions.append(precision)
             means.append(np.linalg.solve(precision, toward))
             norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * means[-1] @ toward)
-    models, found, dense = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((2, rows, 0))), [], []
+    models, found, logs = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((2, rows, 0))), [], []
     # displacements of a log that states what they scatter have priors of their own
     facts = replace(bench.facts, displacement_std=np.full(len(bench.facts.branch), SCATTER))
     extension = replace(bench.base.extension, facts=facts)
     fitted = replace(bench.base, extension=extension, vector=np.zeros(J.shape[1]), jacobian=np.vstack([J, weak]))
-    for seed in (3, 4):
-        drawn = np.random.default_rng(seed).standard_normal(rows)
-        residual = np.r_[drawn, np.zeros(len(J) - rows + len(weak))]
+    drawn = np.random.default_rng(3).standard_normal((rows, 2))
+    for column in drawn.T:
+        residual = np.r_[column, np.zeros(len(J) - rows + len(weak))]
         found.append(evidence(one, replace(fitted, residual=residual))[0].plain)
-        logs = []
-        for precision, mean, norm_of in zip(precisions, means, norms, strict=True):
-            spread = J[:rows] @ np.linalg.solve(precision, J[:rows].T)
-            for sizes, chance in zip(models.sizes, models.log_prior, strict=True):
-                logs.append(normal_log(drawn - J[:rows] @ mean, covariance(one, sizes) + spread) + chance + norm_of)
-        dense.append(np.logaddexp.reduce(logs))
+    wide = [(covariance(one, sizes), chance) for sizes, chance in zip(models.sizes, models.log_prior, strict=True)]
+    for precision, mean, norm_of in zip(precisions, means, norms, strict=True):
+        spread, apart = J[:rows] @ np.linalg.solve(precision, J[:rows].T), drawn - (J[:rows] @ mean)[:, None]
+        logs += [normal_log(apart, noise + spread) + chance + norm_of for noise, chance in wide]
+    dense = np.logaddexp.reduce(logs)
     assert found[1] - found[0] == pytest.approx(dense[1] - dense[0], abs=1e-3)
 
 
+def test_data_as_wrong_as_they_say_are_the_first_of_all_error_models(bench, grid):
+    first, (move, told) = moments(grid, bench.base, negligible=1.0), as_told(grid, bench.base)
+    assert np.allclose(move, first.move[0], rtol=1e-9, atol=1e-12)
+    assert np.allclose(told, first.covariance[0], rtol=1e-9, atol=1e-12)
+
+
 def normal_log(drawn, covariance):
-    """Log density of a normal distribution about zero, but for its factors of 2 pi."""
-    root = np.linalg.cholesky(covariance)
-    return -0.5 * np.sum(np.linalg.solve(root, drawn) ** 2) - np.sum(np.log(np.diag(root)))
+    """Log densities (d,) of draws (n, d) by a normal distribution about zero, but for its factors of 2 pi."""
+    root = cholesky(covariance, lower=True, check_finite=False)
+    whitened = solve_triangular(root, drawn, lower=True, check_finite=False)
+    return -0.5 * np.sum(whitened**2, axis=0) - np.sum(np.log(np.diag(root)))
 
 
-def believed(bench, grid, field, seed):
-    residual, rows = np.zeros(len(bench.base.residual)), bench.observation.rows.count
-    residual[:rows] = field + np.random.default_rng(seed).standard_normal(rows)
-    found = weighed(grid, replace(bench.base, residual=residual), bench.suspicion)
-    further = [Hypothesis((cause,), *values) for cause, values in found.further.items()]
-    return posterior([Hypothesis((), found.own.plain, found.own.rest), *further], list(found.further))
+def believed(bench, grid, fields):
+    """What is believed of each of some whitened fields (rows,) beside a noise of its own."""
+    residuals, rows = np.zeros((len(bench.base.residual), len(fields))), bench.observation.rows.count
+    for seed, field in enumerate(fields):
+        residuals[:rows, seed] = field + np.random.default_rng(seed).standard_normal(rows)
+    for found in weighed_draws(grid, bench.base, bench.suspicion, residuals):
+        further = [Hypothesis((cause,), *values) for cause, values in found.further.items()]
+        yield posterior([Hypothesis((), found.own.plain, found.own.rest), *further], list(found.further))
 
 
 def test_noise_is_noise(bench, grid):
     """Also where the bearing axes err 1.2 times as much as the photos state, a common fault of such statements."""
-    for seed in range(12):
-        field = np.zeros(bench.observation.rows.count)
-        if seed % 2:
-            for photo in bench.observation.photos:
-                own = bench.observation.rows.of_photo(photo.step)
-                axes = np.linalg.qr(photo.whiten @ by_axes(photo.sections, photo.chord))[0]
-                field[own] = 0.2 * axes @ np.random.default_rng(seed).standard_normal(axes.shape[1])
-        found = believed(bench, grid, field, seed)
+    fields = np.zeros((12, bench.observation.rows.count))
+    for seed in range(1, 12, 2):
+        for photo in bench.observation.photos:
+            own = bench.observation.rows.of_photo(photo.step)
+            axes = np.linalg.qr(photo.whiten @ by_axes(photo.sections, photo.chord))[0]
+            fields[seed, own] = 0.2 * axes @ np.random.default_rng(seed).standard_normal(axes.shape[1])
+    for found in believed(bench, grid, fields):
         assert found.word == "base" and found.total(something_else=True) < 0.2
         assert sum(one.probability for one in found.believed) == pytest.approx(1.0)
 
@@ -195,16 +203,16 @@ def test_one_shape_that_comes_and_goes_from_step_to_step(bench, grid, size, word
 
     A rate of 0.9 shows less than 6 of 10 once in a hundred.
     """
-    right, scatter = 0, np.median([np.median(photo.sections.section_std) for photo in bench.observation.photos])
-    for seed in range(10):
+    fields = np.zeros((10, bench.observation.rows.count))
+    scatter = np.median([np.median(photo.sections.section_std) for photo in bench.observation.photos])
+    for seed, field in enumerate(fields):
         rng = np.random.default_rng([5, seed])
-        field, phase = np.zeros(bench.observation.rows.count), rng.uniform(0.0, np.pi)
+        phase = rng.uniform(0.0, np.pi)
         for photo in bench.observation.photos:
             waves = np.sin(5.0 * np.pi * photo.sections.s / 0.181 + phase) ** 3
             height = size * scatter * rng.standard_normal()
             field[bench.observation.rows.of_photo(photo.step)] = photo.whiten[:, 1:] @ (height * waves)
-        right += believed(bench, grid, field, seed).word == word
-    assert right >= 6
+    assert sum(found.word == word for found in believed(bench, grid, fields)) >= 6
 
 
 def test_shares_beforehand_sum_to_one():
