@@ -102,24 +102,21 @@ class ForceDrift(Cause):
         return (SETTLING,) if facts.timed else ()
 
     def by_step(self, amount: float, facts: Facts) -> tuple[tuple[Variant, ...], ...]:
-        """Parts of a random walk, after the test as far from zero as the steady drift: holds, and what lies between.
+        """Rates of a random walk, after the test as far from zero as the steady drift: in each hold, and between them.
 
-        What happened between two holds only the forces there tell, so f_EI is known no better than that.
+        Between two holds the rate is the mean of theirs, and another one by a part of what it may be.
         """
         if not facts.timed:
             return ()
         passing = np.diff(_moments(facts)) / float(np.max(facts.clock))
-        most = max(1.0, abs(amount) / self.plausible(facts))
-        parts = (
-            Variant(WANDERING, at=float(k), known=most / np.sqrt(passing[k])) for k in np.flatnonzero(passing > 0.0)
-        )
-        return (tuple(parts),)
+        most = max(1.0, abs(amount) / self.plausible(facts)) * np.where(np.arange(passing.size) % 2, BETWEEN, 1.0)
+        parts = np.flatnonzero(passing > 0.0)
+        return (tuple(Variant(WANDERING, at=float(k), known=most[k] / np.sqrt(passing[k])) for k in parts),)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount``, the mean rate, times the time since the first hold began.
 
-        A form of `by_step` adds ``amount`` times the time that has passed of the part ``at`` of the test, and takes
-        away so much of the mean rate.
+        A form of `by_step` adds ``amount`` to the rate in part ``at`` of the test and takes away so much of the mean.
         """
         span = float(np.max(facts.clock)) or 1.0
         if variant.label == WANDERING:
@@ -135,19 +132,22 @@ class ForceDrift(Cause):
         return model.observed(shown(reading))
 
 
-WANDERING = "wandering"
-"""Label of a drift whose rate changes."""
+WANDERING, BETWEEN = "wandering", 0.3
+"""Label of a drift whose rate changes, and how far (share of the rates, standard deviation) it changes unseen: what
+stands still in the holds and jumps between them is no drift."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Wandering:
-    """Observer whose zero wanders at ``rates`` (2 n - 1,) N/s about a mean rate, in n holds and between them."""
+    """Observer whose zero wanders about a mean rate: ``rates`` (2 n - 1,) N/s of n holds and, between, beside them."""
 
     rates: Array
 
     def __call__(self, prediction: Prediction, facts: Facts) -> Prediction:
         moments, span = _moments(facts), float(np.max(facts.clock)) or 1.0
-        path = np.append(0.0, np.cumsum(self.rates * np.diff(moments)))
+        rates = self.rates.copy()
+        rates[1::2] += 0.5 * (rates[:-1:2] + rates[2::2])
+        path = np.append(0.0, np.cumsum(rates * np.diff(moments)))
         path -= moments / span * np.interp(span, moments, path)
         zero = shown(lambda force, time, begin: np.asarray(force + np.interp(begin + time, moments, path)))
         return zero(prediction, facts)

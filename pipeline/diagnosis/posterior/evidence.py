@@ -180,7 +180,26 @@ def _moments(solved: Solved, fitted: Fit, negligible: float) -> Moments:
     moves, covariances = np.zeros((len(kept), size)), np.zeros((len(kept), size, size))
     moves[:, own] = move[:, : own.size]
     covariances[:, own[:, None], own] = covariance[:, : own.size, : own.size]
-    return Moments(weight[kept], moves, covariances, rest[kept])
+    return Moments(weight[kept], *_sized(fitted, solved.amounts, moves, covariances), rest[kept])
+
+
+def _sized(fitted: Fit, amounts: Sequence[int], move: Array, covariance: Array) -> tuple[Array, Array]:
+    """Mean (k, p) and covariance (k, p, p) with what is known of the size of each amount.
+
+    Of some the data tell nothing: a gain of the load cell that is free takes the scale of f_EI with it.
+    """
+    extension = fitted.extension
+    for at in amounts:
+        plausible = extension.terms[extension.amounts_at.index(at)].cause.plausible(extension.facts)
+        value, column = fitted.vector[at] + move[:, at], covariance[:, :, at]
+        wide = column[:, at, None] + (SIZES * plausible) ** 2
+        log = -0.5 * (value[:, None] ** 2 / wide + np.log(wide))
+        share = np.exp(log - _total(log.T)[:, None])
+        once, twice = np.sum(share / wide, axis=1), np.sum(share / wide**2, axis=1)
+        move = move - column * (value * once)[:, None]
+        less = once - value**2 * (twice - once**2)
+        covariance = covariance - less[:, None, None] * column[:, :, None] * column[:, None, :]
+    return move, covariance
 
 
 def _total(logs: Array) -> Array:

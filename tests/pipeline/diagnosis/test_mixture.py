@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,8 @@ from fixtures.effects import LARGEST, PROTOCOLS
 from fixtures.hidden import hidden_test
 from fixtures.trials import alien_size
 from pipeline.diagnosis import diagnose
+from pipeline.diagnosis.causes.load_cell import ForceGain
+from pipeline.diagnosis.posterior.evidence import SIZES, _sized
 from pipeline.diagnosis.posterior.mixture import _half_width
 from pipeline.faults import faults_of_input
 from pipeline.identify.parts import curve
@@ -27,6 +31,28 @@ def test_half_width_holds_95_percent_of_what_is_drawn():
     # the quantile of 400,000 draws is known to one percent here
     assert _half_width(weight, mean, std)[0] == pytest.approx(np.quantile(np.abs(drawn), 0.95), rel=0.01)
     assert _half_width(np.ones(1), np.zeros((1, 1)), np.ones((1, 1)))[0] == pytest.approx(1.96, abs=1e-3)
+
+
+@pytest.mark.parametrize(("value", "std"), [(0.03, 0.002), (0.004, 0.01), (5.0, 50.0)])
+def test_what_is_known_of_a_size_moves_all_that_goes_with_it(value, std):
+    """By summing on a grid: an amount of a normal prior of any of the sizes, and an unknown that goes with it."""
+    gain = ForceGain()
+    sizes = SIZES * gain.plausible(None)
+    with_amount, own = -3.0, 0.2
+    covariance = np.array([[own**2 + (with_amount * std) ** 2, with_amount * std**2], [with_amount * std**2, std**2]])
+    extension = SimpleNamespace(amounts_at=(1,), terms=(SimpleNamespace(cause=gain),), facts=None)
+    fitted = SimpleNamespace(extension=extension, vector=np.array([7.0, 0.4 * value]))
+    move, known = _sized(fitted, [1], np.array([[0.1, 0.6 * value]]), covariance[None])
+    at = np.sinh(np.linspace(-9.0, 9.0, 200_001)) * 1e-4
+    prior = np.sum(np.exp(-0.5 * (at / sizes[:, None]) ** 2) / sizes[:, None], axis=0)
+    weight = prior * np.exp(-0.5 * ((at - value) / std) ** 2) * np.gradient(at)
+    weight /= weight.sum()
+    mean = float(weight @ at)
+    variance = float(weight @ (at - mean) ** 2)
+    assert fitted.vector[1] + move[0, 1] == pytest.approx(mean, rel=1e-4, abs=1e-6)
+    assert known[0, 1, 1] == pytest.approx(variance, rel=1e-3)
+    assert move[0, 0] == pytest.approx(0.1 + with_amount * (mean - value), rel=1e-4)
+    assert known[0, 0, 0] == pytest.approx(own**2 + with_amount**2 * variance, rel=1e-3)
 
 
 def test_a_wider_band_is_that_of_curves_that_are_moved():
