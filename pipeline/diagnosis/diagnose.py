@@ -26,7 +26,7 @@ from pipeline.faults import Faults, ForceCorrection
 from pipeline.identify import Identification
 from pipeline.identify.parts import curve as curve_of
 from pipeline.messages import Message
-from pipeline.records import Finding, doubtful
+from pipeline.records import Finding, inferred
 from pipeline.result import DiagnosisPart, ForceCorrectionPart
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse import InverseOutcome
@@ -120,7 +120,7 @@ def _beside(bench: Workbench, conclusion: Conclusion) -> _Beside:
     own = weighed(conclusion.grid.plain, fitted).own
     chance, std = own.moved
     if chance >= 0.5:
-        findings.append(doubtful("log/displacement-scatter", std_m=std))
+        findings.append(inferred("log/displacement-scatter", std_m=std))
     exact = None if chance >= 0.5 or conclusion.accepted is None else held_to(bench.observation, fitted, 0.0)
     if own.rig < 0.5:
         return _Beside(exact, tuple(findings))
