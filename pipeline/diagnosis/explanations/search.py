@@ -1,9 +1,9 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what scores most beside the likeliest four refitted -> causes exchanged while a pair that shares one with the
-likeliest is likelier -> pairs pruned of what they do not need -> where something else is likelier still, the best cause
-with all others -> probabilities of all.
+-> what is likely beside the likeliest four refitted -> causes exchanged while a pair that shares one with the likeliest
+is likelier -> pairs pruned of what they do not need -> where something else is likelier still, the nearest cause with
+all others -> probabilities of all.
 
 Two causes may hide each other, each below its threshold: where no single one is likely, or something else is likelier,
 the pair that removes most by the linear scores is fitted from both at once (`together`).
@@ -42,8 +42,8 @@ LIKELIEST = 4
 NEEDED = 2.5
 """Standard deviations from nothing that each member of a pair must have to be left in it."""
 
-
 Forms = tuple[int, frozenset[str]]
+"""A cause and the labels of its forms."""
 
 
 class Search:
