@@ -106,7 +106,7 @@ class ForceDrift(Cause):
 
         Between two holds the rate is the mean of theirs, and another one by a part of what it may be.
         """
-        if not facts.timed:
+        if not (facts.timed and np.max(facts.clock) > 0.0):
             return ()
         passing = np.diff(_moments(facts)) / float(np.max(facts.clock))
         most = max(1.0, abs(amount) / self.plausible(facts)) * np.where(np.arange(passing.size) % 2, BETWEEN, 1.0)
@@ -154,9 +154,9 @@ class _Wandering:
 
 
 def _moments(facts: Facts) -> Array:
-    """Begin and end of each hold, one after the other, s."""
-    ends = [begin + max(0.0, *times) for begin, times in zip(facts.clock, facts.hold_times, strict=True)]
-    return np.column_stack([facts.clock, ends]).ravel()
+    """Begin and end of each hold, one after the other, s; never back in time."""
+    ends = [begin + np.max(times, initial=0.0) for begin, times in zip(facts.clock, facts.hold_times, strict=True)]
+    return np.asarray(np.maximum.accumulate(np.column_stack([facts.clock, ends]).ravel()))
 
 
 SLOWLY = "by as much in every tenfold of the time"
