@@ -1,6 +1,9 @@
 """Two causes: which pair, and what may stand in the place of each."""
 
+from dataclasses import replace
+
 from fixtures.continuum import Cable
+from fixtures.effects import HIDE, LARGEST, Form
 from fixtures.hidden import LOOP, SIX, Protocol, Reading, hidden_test
 from fixtures.memory import Slipping
 from pipeline.diagnosis import diagnose
@@ -9,6 +12,7 @@ from pipeline.diagnosis.explanations import search
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
+from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.posterior.explanation import explanation_of
@@ -44,6 +48,20 @@ def test_each_half_of_a_pair_has_all_its_forms():
     assert len(whole.fitted.extension.terms) == 3 and whole.gain > half.gain + SHAPE_GAIN
     amount, std = whole.amount(SUSPECTS[lens])
     assert abs(amount - 0.012) < 4.0 * std
+
+
+def test_all_causes_that_are_likely_beside_one_are_tried(monkeypatch):
+    """Beside a K0 that varies an offset of the forces shows little more than others do, any of which may score most."""
+    cable, reading = HIDE["pre_curvature_varying"](0.15, Form("growing along the cable"))
+    test = hidden_test(cable, LOOP, largest=LARGEST, seed=31, reading=replace(reading, force_offset=0.02))
+    bench = prepare(faults_of_input(test), SETTINGS)
+    names = [cause.name for cause in bench.suspicion.causes]
+    tried = []
+    monkeypatch.setattr(search, "pairs_beside", lambda bench, one, second, causes: tried.extend(causes) or [])
+    seeking, varying = search.Search(bench), names.index("pre_curvature_varying")
+    seeking._with_others(refit_one(bench.observation, bench.base, bench.suspicion, varying))
+    assert {"force_offset", "displacement_offset", "in_plane_load"} <= {names[cause] for cause in tried}
+    assert len(tried) < 7
 
 
 def test_every_cause_is_tried_before_something_is_called_unexplained(monkeypatch):
