@@ -120,10 +120,9 @@ class ForceDrift(Cause):
         """
         span = float(np.max(facts.clock)) or 1.0
         if variant.label == WANDERING:
-            last = model.observers[-1] if model.observers else None
-            rates = last.rates.copy() if isinstance(last, _Wandering) else np.zeros(2 * facts.clock.size - 1)
-            rates[int(variant.at)] += amount
-            kept = model.observers[:-1] if isinstance(last, _Wandering) else model.observers
+            rates = amount * np.eye(2 * facts.clock.size - 1)[int(variant.at)]
+            kept = tuple(one for one in model.observers if not isinstance(one, _Wandering))
+            rates = sum((one.rates for one in model.observers if isinstance(one, _Wandering)), rates)
             return replace(model, observers=(*kept, _Wandering(rates)))
 
         def reading(force: Array, time: Array, begin: float) -> Array:

@@ -87,7 +87,7 @@ class BearingFriction(Cause):
             steps = len(facts.branch)
             before = np.zeros((steps, 2)) if bending.friction_by_step is None else bending.friction_by_step
             if variant.label == WITH_FORCE:
-                more = amount * facts.force_share[:, None] * np.ones(2)
+                more = amount * facts.force_share[:, None]
             else:
                 ends = np.array([bending.left.friction_moment, bending.right.friction_moment])
                 share = amount / self.plausible(facts) * np.array([1.0, variant.width])
