@@ -7,7 +7,7 @@ where they add up to one spot or one step, that is tried in their place.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -154,16 +154,6 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) 
             break
         fitted = simplest
     return fitted
-
-
-def differing_by_step(observation: Observation, fitted: Fit, cause: Cause) -> Iterator[Fit]:
-    """The model with a cause in one form, differing from step to step in each of the ways it may."""
-    own, facts = fitted.extension.terms_of(cause), fitted.extension.facts
-    for forms in cause.by_step(fitted.amount(own[0])[0], facts) if len(own) == 1 else ():
-        extension = replace(fitted.extension, terms=(*fitted.extension.terms, *(Term(cause, form) for form in forms)))
-        found = fit_from(observation, extension, np.r_[fitted.vector, np.zeros(len(forms))], fitted)
-        if found.run.prediction is not None:
-            yield found
 
 
 def as_one_form(observation: Observation, fitted: Fit, *, worse: float) -> Fit:

@@ -9,17 +9,18 @@ quarter too small and left more than noise, so two right names were refused.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
-from pipeline.diagnosis.explanations.forms import differing_by_step, with_more_forms
+from pipeline.diagnosis.explanations.forms import with_more_forms
 from pipeline.diagnosis.explanations.free_profile import with_free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
-from rod.inverse.extension import Extension
+from rod.inverse.extension import Extension, Term
 from rod.inverse.fit import fit_from
 
 
@@ -102,10 +103,20 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
 
 
 def by_step(bench: Workbench, one: Explanation) -> list[Explanation]:
-    """An explanation with its causes differing from step to step, one at a time: the evidence says which it is."""
-    kinds_of = [bench.suspicion.causes[cause] for cause in one.causes]
-    fits = [fitted for kind in kinds_of for fitted in differing_by_step(bench.observation, one.fitted, kind)]
-    return [explanation_of(one.causes, bench.base, fitted) for fitted in fits]
+    """An explanation with its causes differing from step to step, in one way at a time: the evidence says which it is.
+
+    Of a cause that is there in one form.
+    """
+    known, found = one.fitted.extension, []
+    for kind in (bench.suspicion.causes[cause] for cause in one.causes):
+        own = known.terms_of(kind)
+        for forms in kind.by_step(one.fitted.amount(own[0])[0], bench.facts) if len(own) == 1 else ():
+            extension = replace(known, terms=(*known.terms, *(Term(kind, form) for form in forms)))
+            start = np.r_[one.fitted.vector, np.zeros(len(forms))]
+            fitted = fit_from(bench.observation, extension, start, one.fitted)
+            if fitted.run.prediction is not None:
+                found.append(explanation_of(one.causes, bench.base, fitted))
+    return found
 
 
 IN_ANY_FORM = 2
