@@ -26,7 +26,7 @@ from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
-from pipeline.diagnosis.posterior.weigh import error_models, refitted, weighed
+from pipeline.diagnosis.posterior.weigh import Weighed, error_models, refitted, weighed
 from rod.inverse.base_fit import settled
 from rod.inverse.fit import FITS, fit_from
 
@@ -53,6 +53,7 @@ class Search:
         self.bench = bench
         self.grid: ErrorGrid = error_models(bench.observation, bench.base, bench.suspicion)
         self._about: dict[Explanation, Suspicion] = {}
+        self._beside: dict[Explanation, Weighed] = {}
         self.causes = [cause for k, cause in enumerate(bench.suspicion.causes) if bench.suspicion.of(k).size]
         first = weighed(self.grid, bench.base, bench.suspicion)
         self.hypotheses = [Hypothesis((), first.own.plain, first.own.rest)]
@@ -110,6 +111,12 @@ class Search:
             self._about[one] = suspect(self.bench.observation, one.fitted, self.bench.suspicion.causes)
         return self._about[one]
 
+    def weighed_beside(self, one: Explanation) -> Weighed:
+        """Evidence of a single cause and, by the linear model, of every other one beside it."""
+        if one not in self._beside:
+            self._beside[one] = weighed(self.grid.plain, one.fitted, self.beside(one))
+        return self._beside[one]
+
     def pairs(self, singles: Sequence[Explanation], found: list[Explanation]) -> None:
         """Refit pairs besides those ``found``: single causes with what scores most beside each.
 
@@ -146,7 +153,7 @@ class Search:
     def _with_others(self, one: Explanation) -> list[Explanation]:
         """A single cause with each of the two that score most beside it, and of those that are likely by the scores."""
         second = self.beside(one)
-        further = {cause: plain for cause, (plain, _) in weighed(self.grid.plain, one.fitted, second).further.items()}
+        further = {cause: plain for cause, (plain, _) in self.weighed_beside(one).further.items()}
         whole = np.logaddexp.reduce([*further.values()])
         likely = [cause for cause, plain in further.items() if plain > whole + np.log(ALSO)]
         return pairs_beside(self.bench, one, second, [*dict.fromkeys([*candidates(second)[:2], *likely])])
@@ -195,8 +202,7 @@ class Search:
 
     def pairs_speak(self, best: Explanation) -> bool:
         """Whether the data make two causes, or something else, likelier than they were beforehand; or may do so."""
-        second, rest = self.beside(best), self.hypotheses[0].rest
-        beside = weighed(self.grid.plain, best.fitted, second)
+        second, beside, rest = self.beside(best), self.weighed_beside(best), self.hypotheses[0].rest
         mine = next(one.plain for one in self.hypotheses if one.found is best)
         for cause, (plain, _) in beside.further.items():
             if cause not in best.causes and second.statistic[second.of(cause)].max() > NEEDED:
