@@ -12,8 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.plans.plan import more_steps, planned_test, precision_of
@@ -23,10 +25,12 @@ from pipeline.result import NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.cause import Cause
 from rod.inverse.fit import Fit
-from rod.inverse.observation import observe
+from rod.inverse.observation import Observation, observe
 from rod.inverse.prediction import Facts
 from rod.inverse.sensitivities import sensitivities, whole_residual
 from rod.inverse.simulation import run
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +86,9 @@ def next_experiment(
     common = set(probable.causes).intersection(*(rival.causes for rival in rivals))
     differing = list(dict.fromkeys(cause for e in every for cause in e.causes if cause not in common))
     names = [causes[cause].name for cause in differing]
+    planned = _Planned(bench, probable.fitted)
     apart = {
-        protocol.what: min(_separation(bench, probable.fitted, rival.fitted, protocol, settings) for rival in rivals)
+        protocol.what: min(planned.separation(rival.fitted, protocol) for rival in rivals)
         for protocol in protocols(bench.facts)
     }
     repeated = apart["next.repeat"]
@@ -112,28 +117,37 @@ BETTER, TELLS = 1.0, 2.0
 from two on."""
 
 
-def _separation(bench: Workbench, probable: Fit, rival: Fit, protocol: Protocol, settings: DiagnosisSettings) -> float:
-    """Sigma between two explanations if the protocol were made and the rival refitted, to first order."""
-    precision = precision_of(bench.test, bench.observation.force_std)
-    blocks = [(bench.facts, False)] if protocol.again else []
-    blocks.append((protocol.facts, protocol.turned))
-    values, columns = [], []
-    for facts, turned in blocks:
-        truth = replace(probable.extension, facts=facts, turned=turned)
-        made = run(truth.model(probable.vector), facts)
-        if made.prediction is None:
+class _Planned:
+    """What the most probable explanation would show, and each rival misfit of it; nothing is simulated twice."""
+
+    def __init__(self, bench: Workbench, probable: Fit) -> None:
+        self.bench, self.probable = bench, probable
+        self.precision = precision_of(bench.test, bench.observation.force_std)
+        self.shown, self.held = cache(self._shown), cache(self._held)
+
+    def separation(self, rival: Fit, protocol: Protocol) -> float:
+        """Sigma between two explanations if the protocol were made and the rival refitted, to first order."""
+        blocks = [(self.bench.facts, False)] if protocol.again else []
+        held = [self.held(rival, *block) for block in (*blocks, (protocol.facts, protocol.turned))]
+        seen = [block for block in held if block is not None]
+        if len(seen) < len(held):
             return 0.0
-        observation = observe(planned_test(made, facts, precision))
-        other = replace(rival.extension, facts=facts, turned=turned)
+        value, jacobian = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+        size = np.linalg.norm(jacobian, axis=0)
+        scaled = jacobian / np.where(size > 0.0, size, 1.0)
+        return float(np.linalg.norm(value - scaled @ np.linalg.lstsq(scaled, value, rcond=1e-8)[0]))
+
+    def _shown(self, facts: Facts, turned: bool) -> Observation | None:
+        truth = replace(self.probable.extension, facts=facts, turned=turned)
+        made = run(truth.model(self.probable.vector), facts)
+        return None if made.prediction is None else observe(planned_test(made, facts, self.precision))
+
+    def _held(self, rival: Fit, facts: Facts, turned: bool) -> tuple[Array, Array] | None:
+        """Residual and sensitivities of a rival."""
+        observation, other = self.shown(facts, turned), replace(rival.extension, facts=facts, turned=turned)
+        if observation is None:
+            return None
         base_model = other.base_model(rival.vector)
-        shown = run(other.model(rival.vector, of=base_model), facts)
-        value = whole_residual(observation, shown.prediction, rival.vector, other.prior)
-        if value is None:
-            return 0.0
-        values.append(value)
-        columns.append(sensitivities(observation, other, rival.vector, base_model, shown))
-    value, jacobian = np.concatenate(values), np.vstack(columns)
-    size = np.linalg.norm(jacobian, axis=0)
-    scaled = jacobian / np.where(size > 0.0, size, 1.0)
-    left = value - scaled @ np.linalg.lstsq(scaled, value, rcond=1e-8)[0]
-    return float(np.linalg.norm(left))
+        here = run(other.model(rival.vector, of=base_model), facts)
+        value = whole_residual(observation, here.prediction, rival.vector, other.prior)
+        return None if value is None else (value, sensitivities(observation, other, rival.vector, base_model, here))

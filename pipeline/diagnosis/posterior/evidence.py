@@ -43,7 +43,6 @@ from pipeline.diagnosis.posterior.unknowns import (
     solved_alone,
     solved_for,
     solved_once,
-    with_columns,
 )
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
@@ -85,8 +84,9 @@ def evidence(
     grid: ErrorGrid, fitted: Fit, terms: Sequence[Term] = (), columns: Array | None = None
 ) -> tuple[Evidence, WithColumn]:
     """Evidence of a fit, and of the fit with each of some further columns; see `evidences`."""
-    solved = solved_once(grid, fitted) if columns is None else with_columns(grid, fitted, columns)
-    return _summed(grid, fitted, terms, solved)[0]
+    if columns is None:
+        return _summed(grid, fitted, terms, solved_once(grid, fitted))[0]
+    return evidences(grid, fitted, fitted.residual[:, None], terms, columns)[0]
 
 
 def evidences(

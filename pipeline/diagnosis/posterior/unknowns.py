@@ -11,7 +11,7 @@ are left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -19,12 +19,9 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, Products
 from rod.inverse.fit import Fit
-from rod.law_prior import Conditioned, conditioned
+from rod.law_prior import Conditioned, conditioned, inverse_root
 
 Array = NDArray[np.float64]
-
-ROUNDING = 1e-11
-"""Of the scale of an unknown: what falls below is rounding."""
 
 NOTHING = 30.0
 """Of log p: what lies so far below the largest is nothing whatever the prior of an amount makes of it."""
@@ -36,15 +33,13 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 class Solved:
     """What the fit's own unknowns are for every error model: p of the law, then r others; l families of its prior.
 
-    ``kept`` (G,): which of the grid's error models they are. The others are eliminated first: ``half`` (G, r, r), W
-    with W' W the inverse of their information; ``across`` (G, r, p) and ``pull`` (G, r, d), W times their products with
-    the law's and with b. Then the law's by each family, see `rod.law_prior.Conditioned`. ``flat`` (G, l, t, d): log p
-    flat in the amounts. ``amounts``: positions in the vector of those that no prior row states, ``move``
-    (G, l, t, d, a) of these and ``covariance`` (G, l, t, a, a).
+    The others are eliminated first: ``half`` (G, r, r), W with W' W the inverse of their information; ``across``
+    (G, r, p) and ``pull`` (G, r, d), W times their products with the law's and with b. Then the law's by each family,
+    see `rod.law_prior.Conditioned`. ``flat`` (G, l, t, d): log p flat in the amounts. ``amounts``: positions in the
+    vector of those that no prior row states, ``move`` (G, l, t, d, a) of these and ``covariance`` (G, l, t, a, a).
     """
 
     products: Products
-    kept: NDArray[np.int_]
     half: Array
     across: Array
     pull: Array
@@ -64,19 +59,12 @@ solved_alone = lru_cache(maxsize=1)(solved_once)
 """The same, kept until another fit is asked for: the one that answers is asked for several times."""
 
 
-def with_columns(grid: ErrorGrid, fitted: Fit, more: Array) -> Solved:
-    """The same with further columns (N, k)."""
-    solved = solved_alone(grid, fitted)
-    products, _ = _products(grid, fitted, more, fitted.residual[:, None])
-    return replace(solved, products=products.at(solved.kept))
-
-
 def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> Solved:
     """The unknowns of a fit for residuals (N, d) in the place of its own; ``more`` (N, k): further columns."""
     several, size = residuals.shape[1], fitted.extension.base.law.size
     products, normal = _products(grid, fitted, more, residuals)
     law = slice(several, several + size)
-    half, log_det = _inverse_root(products.own[:, law.stop :, law.stop :])
+    half, log_det = inverse_root(products.own[:, law.stop :, law.stop :])
     pull, across = np.split(half @ products.own[:, law.stop :, : law.stop], [several], axis=2)
     schur = products.own[:, law, law] - across.swapaxes(1, 2) @ across
     pulls = products.own[:, law, :several] - across.swapaxes(1, 2) @ pull
@@ -85,7 +73,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
     normal += 0.5 * len(amounts) * LOG_2PI
     common = normal - 0.5 * (squares + (products.log_det + log_det)[:, None])
-    kept = _that_matter(products, common + _by_one_prior(fitted, schur, pulls))
+    kept = _that_matter(products, common + _by_one_prior(fitted, schur, pulls), beside=more.shape[1] > 0)
     products, half, pull, across, common = products.at(kept), half[kept], pull[kept], across[kept], common[kept]
     a = fitted.vector[:size]
     laws = tuple(conditioned(schur[kept], pulls[kept], a, one) for one in fitted.extension.base.law.families)
@@ -97,7 +85,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
         moves.append(alone - np.einsum("gap,gtpd->gtda", along, one.moves))
         covariances.append(np.einsum("gap,gtp,gbp->gtab", along, 1.0 / one.precisions, along, optimize=True))
     covariance = np.stack(covariances, axis=1) + (own @ own.swapaxes(1, 2))[:, None, None]
-    return Solved(products, kept, half, across, pull, laws, flat, amounts, np.stack(moves, axis=1), covariance)
+    return Solved(products, half, across, pull, laws, flat, amounts, np.stack(moves, axis=1), covariance)
 
 
 def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tuple[Products, float]:
@@ -122,16 +110,6 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
     return found, sum(_log_known(fitted)) - float(np.sum(np.log(std)))
 
 
-def _inverse_root(H: Array) -> tuple[Array, Array]:
-    """W (G, r, r) with W' W = H^-1, and log|H| (G,)."""
-    shown = np.einsum("gii->gi", H)
-    scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
-    whole = H / (scale[:, :, None] * scale[:, None, :])
-    np.einsum("gii->gi", whole)[:] += ROUNDING
-    root = np.asarray(np.linalg.cholesky(whole), dtype=np.float64)
-    return np.linalg.inv(root) / scale[:, None], 2.0 * np.log(np.einsum("gii->gi", root) * scale).sum(axis=1)
-
-
 def _by_one_prior(fitted: Fit, schur: Array, pulls: Array) -> Array:
     """What the law adds to log p (G, d) by the one prior that the fit holds it by, up to a constant."""
     base = fitted.extension.base
@@ -142,10 +120,15 @@ def _by_one_prior(fitted: Fit, schur: Array, pulls: Array) -> Array:
     )
 
 
-def _that_matter(products: Products, rough: Array) -> NDArray[np.int_]:
-    """Error models without something else, and those with it that are not nothing by a rough log p (G, d)."""
-    log = np.where(products.rest[:, None], rough + products.log_prior[:, None], -np.inf)
-    return np.flatnonzero(~products.rest | np.any(log > log.max(axis=0) - NOTHING, axis=1))
+def _that_matter(products: Products, rough: Array, *, beside: bool) -> NDArray[np.int_]:
+    """Error models, with and without something else, that are not nothing by a rough log p (G, d), and the first one.
+
+    Further columns ``beside`` the fit may make any of those without something else the likeliest.
+    """
+    log, kept = rough + products.log_prior[:, None], np.arange(len(rough)) == 0
+    for part in (products.rest, ~products.rest):
+        kept |= part & np.any(log > np.max(log[part], axis=0, initial=-np.inf) - NOTHING, axis=1)
+    return np.flatnonzero(kept | (~products.rest & beside))
 
 
 def mean_over_laws(by_law: Array) -> Array:
