@@ -1,7 +1,7 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what is likely beside the likeliest four refitted -> causes exchanged while a pair that shares one with the likeliest
+-> what begins between two holds beside the likeliest -> what is likely beside the likeliest four refitted -> causes exchanged while a pair that shares one with the likeliest
 is likelier -> pairs pruned of what they do not need -> where something else is likelier still, the nearest cause with
 all others -> probabilities of all.
 
@@ -18,8 +18,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
+from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
+from pipeline.diagnosis.explanations.refit import fit_term
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -137,7 +140,7 @@ class Search:
         # before something is called unexplained, every other cause is tried in its place beside the nearest one
         if believed.word == "rest":
             alone = (one.found for one in believed.beside_something_else() if len(one.causes) == 1)
-            best = next((one for one in alone if one is not None), singles[0])
+            best = next((one for one in alone if one is not None and not one.begun), singles[0])
             second = self.beside(best)
             every = candidates(second, margin=1.0, most=len(second.causes))
             others = [cause for cause in every if not any({*best.causes, cause} == {*pair.causes} for pair in found)]
@@ -200,6 +203,17 @@ class Search:
                 reached[left] = min(rest.fitted.chi2, reached.get(left, np.inf))
                 yield rest
 
+    def begun(self) -> None:
+        """What begins between two holds, beside the base model and the likeliest causes: it is something else."""
+        base, bench = explanation_of((), self.bench.base, self.bench.base), self.bench
+        for one in (base, *(found.found for found in self.posterior.explanations()[:LIKELIEST] if found.found)):
+            about = suspect(bench.observation, one.fitted, BEGUN)
+            loud = (about.best(number) for number in range(len(BEGUN)))
+            since = [k for k in loud if k is not None and about.statistic[k] ** 2 > SHAPE_GAIN]
+            fits = (fit_term(bench.observation, one.fitted, about, k) for k in since)
+            found = (explanation_of(one.causes, bench.base, fitted) for fitted in fits if fitted is not None)
+            self.hypotheses += [refitted(self.grid.plain, explanation, bench.facts) for explanation in found]
+
     def pairs_speak(self, best: Explanation) -> bool:
         """Whether the data make two causes, or something else, likelier than they were beforehand; or may do so."""
         second, beside, rest = self.beside(best), self.weighed_beside(best), self.hypotheses[0].rest
@@ -217,13 +231,14 @@ def searched(bench: Workbench) -> Search:
     search = Search(bench)
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
-    silent = silent and first.word == "base" and bench.largest < bench.limit
+    silent = silent and first.word == "base"
     hidden = hidden_pair(bench.suspicion) if silent else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise
     fits = bench.base.chi2 < FITS * (len(bench.base.residual) - bench.base.extension.size)
     if silent and fits and not hidden:
         return search
     search.singles()
+    search.begun()
     singles = [one.found for one in search.posterior.explanations(count=1) if one.found is not None][:LIKELIEST]
     if singles and (search.pairs_speak(singles[0]) or hidden):
         if not hidden and search.posterior.word == "rest":

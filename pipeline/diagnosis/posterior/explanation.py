@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.profile import WAVE_COST, is_wave, largest_of
 from rod.inverse.fit import Fit
 
@@ -27,6 +28,11 @@ class Explanation:
     causes: tuple[int, ...]
     fitted: Fit
     gain: float
+
+    @property
+    def begun(self) -> bool:
+        """Whether it holds what begins between two holds, which is no cause of the catalogue."""
+        return any(term.cause in BEGUN for term in self.fitted.extension.terms)
 
     @property
     def worth(self) -> float:

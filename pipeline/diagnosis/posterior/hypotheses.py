@@ -9,7 +9,8 @@
     two causes and something else   0.01
 
 The probability of each is that share times its evidence (`evidence`): at its own refit where it has one, else by the
-linear model about the base, the mean over the forms of the cause. Ten times another share changes few words: with base
+linear model about the base, the mean over the forms of the cause. What begins between two holds
+(`pipeline.diagnosis.causes.begun`) is something else that has a refit. Ten times another share changes few words: with base
 0.8 three more real effects of 59 stay silent, with 0.3 three nulls of 36 get a name.
 
 What is said is the likeliest of three: the base model, causes of the catalogue, or something else. Among causes the
@@ -113,18 +114,18 @@ def posterior(hypotheses: Sequence[Hypothesis], causes: Sequence[Cause]) -> Post
     causes : sequence of Cause
         That share what is given to one cause, and to pairs, beforehand.
     """
-    best: dict[frozenset[int], Hypothesis] = {}
+    best: dict[tuple[frozenset[int], bool], tuple[bool, float, Hypothesis]] = {}
     for one in hypotheses:
-        key = frozenset(one.causes)
-        if key not in best or (one.found is not None, one.plain) > (best[key].found is not None, best[key].plain):
-            best[key] = one
+        for something_else, value in ((False, one.plain), (True, one.rest)):
+            key, found = (frozenset(one.causes), something_else), (one.found is not None or not one.causes, value, one)
+            if np.isfinite(value) and (key not in best or found[:2] > best[key][:2]):
+                best[key] = found
     many = max(len(causes), 1)
     ways = {0: 1, 1: many, 2: max(many * (many - 1) // 2, 1)}
     rows = []
-    for one in best.values():
-        for something_else, value in ((False, one.plain), (True, one.rest)):
-            share = SHARES[len(one.causes)][something_else] / ways[len(one.causes)]
-            rows.append((value + np.log(share), one, something_else))
+    for (_, something_else), (_, value, one) in best.items():
+        share = SHARES[len(one.causes)][something_else] / ways[len(one.causes)]
+        rows.append((value + np.log(share), one, something_else))
     top = max(value for value, *_ in rows)
     weights = [float(np.exp(value - top)) for value, *_ in rows]
     whole = sum(weights)

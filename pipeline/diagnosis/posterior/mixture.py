@@ -106,7 +106,8 @@ def _refits(
         fitted = one.found.fitted if one.found else base
         if one.probability > NEGLIGIBLE and (one.found or one.something_else or not one.causes):
             chance = chances.setdefault(id(fitted), (fitted, {}))[1]
-            chance[one.something_else] = chance.get(one.something_else, 0.0) + one.probability
+            disturbed = one.something_else and not (one.found and one.found.begun)
+            chance[disturbed] = chance.get(disturbed, 0.0) + one.probability
     for fitted, chance in chances.values():
         here = stated(fitted, centre.kappa)
         found = moments(grid if True in chance else grid.plain, fitted, negligible=NEGLIGIBLE)

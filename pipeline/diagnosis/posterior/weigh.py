@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
+from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.fits.search import Suspicion, ordinary
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence, evidences
@@ -67,11 +68,17 @@ def _of_causes(suspicion: Suspicion, found_of: list[tuple[Evidence, WithColumn]]
 
 
 def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:
-    """The hypothesis of a refit, its forms one choice of many each."""
+    """The hypothesis of a refit, its forms one choice of many each; what begins between two holds is something else."""
     own = evidence(grid, found.fitted)[0]
     terms = (term for term in found.fitted.extension.terms if not np.isfinite(term.variant.known))
     tried = sum(_kinds(term.cause, facts) for term in terms)
+    if found.begun:
+        return Hypothesis(found.causes, -np.inf, own.plain - tried + float(np.log(BEGINS / len(BEGUN))), found)
     return Hypothesis(found.causes, own.plain - tried, own.rest - tried, found)
+
+
+BEGINS = 0.25
+"""Of the probability of something else beforehand: what begins between two holds."""
 
 
 def _kinds(cause: Cause, facts: Facts) -> float:

@@ -62,7 +62,7 @@ def present(
         ]
         errors += _begun_unseen(accepted.fitted)
         again = identified_again(bench.observation, shown or accepted.fitted, force_errors=errors)
-        if conclusion.unmodelled:
+        if conclusion.unmodelled and not accepted.begun:
             # the nearest cause may not be there at all: without it the data have another answer
             again = replace(again, other=bench.base)
     extended = None if again is None else extended_curve(again, settings)

@@ -1,0 +1,55 @@
+"""What begins between two holds: something else, told with its size and since when, f_EI beside it.
+
+Data by collocation, no rod of ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fixtures.continuum import Cable
+from fixtures.effects import LARGEST, PROTOCOLS
+from fixtures.hidden import Reading, hidden_test
+from pipeline.diagnosis import diagnose
+from pipeline.faults import faults_of_input
+
+
+def changed(before, after, protocol, first, *, seed):
+    """A test in which the cable is another one from a step on, the chords as they would have been."""
+    rest = [cable.length * np.sinc(0.5 * cable.K0 * cable.length / np.pi) for cable in (before, after)]
+    readings = Reading(), Reading(play=float(rest[1] - rest[0]))
+    one, other = (
+        hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=seed, reading=reading)
+        for cable, reading in zip((before, after), readings, strict=True)
+    )
+    return replace(one, steps=(*one.steps[:first], *other.steps[first:]))
+
+
+@pytest.mark.parametrize(("protocol", "seed"), [("six", 81), ("loop", 82)])
+def test_a_cable_that_rolls_about_its_axis(protocol, seed):
+    """Its pre-curvature in the plane falls. It was taken for friction of the bearings and a drift, at 1.00."""
+    cable = Cable()
+    test = changed(cable, replace(cable, K0=cable.K0 - 0.2), protocol, 4, seed=seed)
+    part, _, _ = diagnose(faults_of_input(test), None)
+    assert part.verdict == "unexplained" and not part.causes, part.headline
+    said = part.leftover.values
+    assert part.leftover.key == "left.begun.rest" and said["step"] == test.steps[4].step, part.headline
+    size, std, _ = said["size"]
+    assert size == pytest.approx(-0.2, abs=4.0 * std) and std < 0.02
+    K, f, band = (np.array(getattr(part.extended, of)) for of in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2"))
+    assert np.sqrt(np.mean((f / cable.law(K - cable.K0)[1] - 1.0) ** 2)) < 0.02
+    assert np.mean(np.abs(f - cable.law(K - cable.K0)[1]) < 1.96 * band) > 0.9
+
+
+@pytest.mark.parametrize("seed", [83, 84])
+def test_a_cable_that_becomes_stiffer_all_at_once(seed):
+    """Less than what a load cell whose range is switched would do."""
+    cable = Cable()
+    test = changed(cable, replace(cable, EI0=1.025 * cable.EI0, EI1=1.025 * cable.EI1), "six", 4, seed=seed)
+    part, _, _ = diagnose(faults_of_input(test), None)
+    assert part.verdict == "unexplained" and part.leftover.key == "left.begun.stiffness", part.headline
+    size, std, _ = part.leftover.values["size"]
+    assert size == pytest.approx(0.025, abs=4.0 * std) and part.leftover.values["step"] == test.steps[4].step
