@@ -11,7 +11,7 @@ from pipeline.result import LeftoverPart
 
 
 def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
-    """What is likeliest to be something else."""
+    """Say where in the data that is which is likeliest to be something else."""
     observation, fitted = bench.observation, conclusion.fitted(bench)
     field = something_else(conclusion.grid, fitted)
     found = whereabouts(observation, field)
