@@ -13,7 +13,7 @@ Relaxation belongs to the cable, but as it scales moments everywhere alike it ch
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -130,6 +130,19 @@ class ForceDrift(Cause):
 
         return model.observed(shown(reading))
 
+    def together(self, forms: Sequence[Variant], facts: Facts) -> tuple[str, Array] | None:
+        """How far a zero that wanders has gone, N, when holds begin and end."""
+        if all(form.label != WANDERING for form in forms):
+            return None
+        span, parts = float(np.max(facts.clock)) or 1.0, np.eye(2 * facts.clock.size - 1)
+        rows = [
+            _path(parts[int(form.at)], facts)
+            if form.label == WANDERING
+            else span * passed(_moments(facts) / span, form.width)
+            for form in forms
+        ]
+        return "N", np.column_stack(rows)
+
 
 WANDERING, BETWEEN = "wandering", 0.3
 """Label of a drift whose rate changes, and how far (share of the rates, standard deviation) it changes unseen: what
@@ -143,13 +156,18 @@ class _Wandering:
     rates: Array
 
     def __call__(self, prediction: Prediction, facts: Facts) -> Prediction:
-        moments, span = _moments(facts), float(np.max(facts.clock)) or 1.0
-        rates = self.rates.copy()
-        rates[1::2] += 0.5 * (rates[:-1:2] + rates[2::2])
-        path = np.append(0.0, np.cumsum(rates * np.diff(moments)))
-        path -= moments / span * np.interp(span, moments, path)
+        moments, path = _moments(facts), _path(self.rates, facts)
         zero = shown(lambda force, time, begin: np.asarray(force + np.interp(begin + time, moments, path)))
         return zero(prediction, facts)
+
+
+def _path(rates: Array, facts: Facts) -> Array:
+    """Where a zero that wanders is at `_moments`, N, beside its mean rate."""
+    moments, span = _moments(facts), float(np.max(facts.clock)) or 1.0
+    rates = rates.copy()
+    rates[1::2] += 0.5 * (rates[:-1:2] + rates[2::2])
+    path = np.append(0.0, np.cumsum(rates * np.diff(moments)))
+    return np.asarray(path - moments / span * np.interp(span, moments, path))
 
 
 def _moments(facts: Facts) -> Array:

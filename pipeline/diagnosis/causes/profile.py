@@ -174,16 +174,22 @@ def _factor(model: Model) -> Array:
 
 
 def largest_of(forms: Sequence[Variant], amounts: Array, covariance: Array, cause: Cause) -> Array:
-    """The forms (k,) of a cause where their sum deviates most: the size of the cause is this times their amounts.
-
-    Most is what lies furthest beyond two standard deviations: where no photo shows the cable, under a cover, waves may
-    run far and mean nothing. ``covariance`` (k, k) is that of the amounts.
-    """
+    """The forms (k,) of a cause where their sum deviates most: the size of the cause is this times their amounts."""
     position, beside = np.linspace(0.0, 1.0, 401), isinstance(cause, StiffnessVarying)
-    table = np.column_stack([profile(form, position, from_beside=beside) for form in forms])
-    size = np.abs(table @ amounts)
-    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", table, covariance, table), 0.0))
-    return np.asarray(table[int(np.argmax(size - 2.0 * std))])
+    return largest(
+        np.column_stack([profile(form, position, from_beside=beside) for form in forms]), amounts, covariance
+    )
+
+
+def largest(rows: Array, amounts: Array, covariance: Array) -> Array:
+    """Row (k,) of ``rows`` (m, k) whose product with amounts of that covariance (k, k) is largest.
+
+    Largest is what lies furthest beyond two standard deviations: where no photo shows the cable, under a cover, waves
+    may run far and mean nothing.
+    """
+    size = np.abs(rows @ amounts)
+    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, covariance, rows), 0.0))
+    return np.asarray(rows[int(np.argmax(size - 2.0 * std))])
 
 
 def position_of(model: Model) -> Array:
