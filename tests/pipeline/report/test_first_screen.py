@@ -40,6 +40,19 @@ def test_what_could_hide_is_told_where_it_would_leave_the_band(diagnosed):
     assert told[0] == "hysteresis, by up to 27 % of f_EI: unloading in the same steps would show it."
 
 
+def test_what_is_quoted_lies_where_the_data_determine_it(diagnosed):
+    """Where hardly any of the cable was bent so far the band runs away: 8.5 +- 2.0 at the end of 18.0 +- 0.9."""
+    result = diagnosed("unexplained")
+    curve = result.inverse.curve
+    std = np.array(curve.tangent_std_Nm2)
+    std[-3:] *= 12.0
+    spiked = curve.model_copy(update={"tangent_std_Nm2": std.tolist()})
+    result = result.model_copy(update={"inverse": result.inverse.model_copy(update={"curve": spiked})})
+    (kappa, _, band) = result.answer.curve.ends()[1]
+    assert kappa == curve.kappa_per_m[-4] and band == std[-4]
+    assert f"κ\xa0=\xa0{kappa:.3g}\xa01/m" in first_screen(result, WORDS, SETTINGS).sentence
+
+
 def test_nothing_is_concluded_from_numbers_that_are_not_usable(diagnosed):
     result = with_spots(diagnosed("adequate").model_copy(update={"photos": []}), ("hysteresis", 0.27))
     fault = FindingPart(code="size/force", level="error", message="the forces seem to be 1000 times too large")
