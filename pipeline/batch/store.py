@@ -43,10 +43,7 @@ class Store:
     def locked(self) -> Iterator[None]:
         """Hold the folder for one run; what an earlier, killed run left ready is put in place, half done is removed.
 
-        Raises
-        ------
-        InputError
-            ``out/busy`` if another run holds it, ``out/unwritable`` if it cannot be written.
+        Raises `InputError` ``out/busy`` if another run holds it, ``out/unwritable`` if it cannot be written.
         """
         try:
             self._work("ready").mkdir(parents=True, exist_ok=True)
@@ -103,10 +100,7 @@ class Store:
     def place(self, name: str) -> Path:
         """Where a result goes.
 
-        Raises
-        ------
-        InputError
-            ``out/foreign-folder`` if the place holds something that is no result: it is left alone.
+        Raises `InputError` ``out/foreign-folder`` if the place holds something that is no result: it is left alone.
         """
         place = self.out / name
         if self._foreign(place):

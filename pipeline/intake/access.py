@@ -51,10 +51,7 @@ def is_folder(path: Path) -> bool:
 def read_bytes(path: Path, *, limit: int, setting: str) -> bytes:
     """Contents of a regular file of at most ``limit`` bytes.
 
-    Raises
-    ------
-    InputError
-        ``file/unreadable``, ``file/not-a-file``, ``file/too-large``.
+    Raises `InputError` ``file/unreadable``, ``file/not-a-file``, ``file/too-large``.
     """
     check_file(path, limit=limit, setting=setting)
     try:
@@ -80,13 +77,7 @@ def check_file(path: Path, *, limit: int, setting: str) -> None:
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file, read in pieces.
-
-    Raises
-    ------
-    InputError
-        ``file/unreadable``.
-    """
+    """SHA-256 of a file, read in pieces; raises `InputError` ``file/unreadable``."""
     try:
         with path.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()

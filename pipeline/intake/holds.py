@@ -69,11 +69,8 @@ def load_steps(
 ) -> tuple[tuple[LoadStep, ...], tuple[Finding, ...]]:
     """Group the samples into steps.
 
-    Raises
-    ------
-    InputError
-        ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters,
-        ``log/too-many-steps``.
+    Raises `InputError` ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters,
+    ``log/too-many-steps``.
     """
     name = path.name
     displacements, tolerance, runs, grouped = _grouped(samples, path, settings)

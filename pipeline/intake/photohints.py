@@ -20,10 +20,7 @@ MOST_POINTS = 10_000
 def read_hints(source: TomlFile) -> dict[str, PhotoHints]:
     """Hints by the photo's name relative to the folder.
 
-    Raises
-    ------
-    InputError
-        ``toml/unknown-key``, ``toml/wrong-value``, ``toml/missing-key``.
+    Raises `InputError` ``toml/unknown-key``, ``toml/wrong-value``, ``toml/missing-key``.
     """
     tables = source.tables.get("photos", [])
     if not isinstance(tables, list) or any(not isinstance(table, dict) for table in tables):

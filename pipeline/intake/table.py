@@ -58,13 +58,7 @@ class Table:
 
 
 def read_table(rows: Rows, columns: Columns, path: Path) -> Table:
-    """Split the rows below the header.
-
-    Raises
-    ------
-    InputError
-        ``log/row-length``.
-    """
+    """Split the rows below the header; raises `InputError` ``log/row-length``."""
     table, surplus = _split(rows, columns)
     end = _end_of_samples(table, columns)
     if surplus < end:

@@ -44,10 +44,8 @@ def _set_without_number(form: CauseForm) -> CauseForm:
 def read_result(path: Path | str) -> Result:
     """Read ``result.json``, or the one in a folder.
 
-    Raises
-    ------
-    InputError
-        ``result/unreadable`` if it cannot be read or is none, ``result/version`` if another version wrote it.
+    Raises `InputError` ``result/unreadable`` if it cannot be read or is none, ``result/version`` if another version
+    wrote it.
     """
     file = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
     try:

@@ -24,10 +24,7 @@ Floats = list[Number]
 def check_one_length(part: BaseModel, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> None:
     """Refuse lists of a part that differ in length; optional ones may be empty.
 
-    Raises
-    ------
-    ValueError
-        With the lengths.
+    Raises `ValueError` with the lengths.
     """
     lengths = {name: len(getattr(part, name)) for name in (*needed, *optional)}
     if len({lengths[name] for name in lengths if name in needed or lengths[name]}) > 1:

@@ -202,13 +202,7 @@ def as_entry(row: IndexRow) -> dict[str, Any]:
 
 
 def from_entry(data: object) -> IndexRow:
-    """The row of an entry.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or one of another version.
-    """
+    """The row of an entry; raises `ValueError` if it is none, or one of another version."""
     if not isinstance(data, dict) or data.get("version") != ROW:
         raise ValueError("no row of this version")
     try:

@@ -231,10 +231,7 @@ def start(
     K0, with ``side`` (1/m) the law that photos show beside that K0. A displacement that is known to ``exact`` (m) or
     better has no error of its own.
 
-    Raises
-    ------
-    ValueError
-        If no step has both a photo and a force.
+    Raises `ValueError` if no step has both a photo and a force.
     """
     K, m = measured_curvatures(test)
     slope, rest = np.polyfit(m, K, 1) if np.ptp(m) > 0.0 else (0.0, float(np.mean(K)))
@@ -296,10 +293,7 @@ def _first_error(test: MeasuredTest, facts: Facts, index: int, pre_curvature: fl
 def measured_curvatures(test: MeasuredTest) -> tuple[Array, Array]:
     """Curvature (n,) 1/m and moment P y (n,) N m wherever photos show the cable, but for their outermost tenths.
 
-    Raises
-    ------
-    ValueError
-        If no step has both a photo and a force.
+    Raises `ValueError` if no step has both a photo and a force.
     """
     curvature, moment = [], []
     for step in test.steps:

@@ -157,9 +157,6 @@ class Cause(ABC):
     def along_cable(self, variant: Variant, model: Model) -> tuple[str, Array]:
         """Parameter of `rod.parameters` that the amount of a form moves, and the basis (n joints,) along which.
 
-        Raises
-        ------
-        NotImplementedError
-            If the cause does not vary along the cable.
+        Raises `NotImplementedError` if the cause does not vary along the cable.
         """
         raise NotImplementedError(self.name)
