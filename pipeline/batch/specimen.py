@@ -227,12 +227,7 @@ def _said(result: Result) -> dict[str, Any]:
 def store_failure(order: Order, findings: list[FindingPart], started: float, *, trace: str | None = None) -> Outcome:
     """Store a specimen that could not be measured, with its reason; if even that fails the outcome carries it.
 
-    Parameters
-    ----------
-    started : float
-        s, `time.monotonic` when the specimen was begun.
-    trace : str, optional
-        Where in the program it failed, kept in the provenance.
+    ``started``: `time.monotonic` at its begin, s; ``trace``: where in the program it failed, for the provenance.
     """
     store = Store(order.out)
     result = failed_result(order, findings, trace)

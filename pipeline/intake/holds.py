@@ -304,17 +304,7 @@ def _hold_findings(
 
 
 def order_findings(steps: Sequence[LoadStep], tolerance: float, *, name: str) -> Iterator[Finding]:
-    """Contradictions between neighbouring steps.
-
-    Parameters
-    ----------
-    steps : sequence of LoadStep
-        In the order of the log.
-    tolerance : float
-        m, displacements that close are equal.
-    name : str
-        Of the log, for the messages.
-    """
+    """Contradictions between neighbouring steps; displacements closer than ``tolerance`` (m) are equal."""
     for before, after in pairwise(steps):
         change = after.displacement_m - before.displacement_m
         place = {"file": name, "line": after.line, "step": after.step, "before": before.step}

@@ -94,10 +94,7 @@ def _split(rows: Rows, columns: Columns) -> tuple[Table, int]:
 
 
 def _end_of_samples(table: Table, columns: Columns) -> int:
-    """Where rows begin that are no samples: a mean or a remark below a table that is full above it.
-
-    Without a displacement where all rows above have one, or with the name of a mean where they have a number.
-    """
+    """Where means and remarks begin below the samples: no displacement, or the name of a mean in place of a number."""
     end = len(table.places)
     while end and _is_summary(table.rows[table.places[end - 1]][1], columns):
         end -= 1

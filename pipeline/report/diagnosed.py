@@ -85,10 +85,7 @@ def _separates(experiment: NextExperiment, words: Words) -> str:
 
 
 def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
-    """One line a cause: name, probability, estimate, and what it cannot be told from; and what the catalogue says.
-
-    A cause that does not suffice may not be there at all: nobody is told to mend it.
-    """
+    """Name, probability, estimate and twins of a cause, and what to do; not of one that does not suffice."""
     named = []
     for cause in part.causes:
         estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)

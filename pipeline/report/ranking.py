@@ -1,4 +1,4 @@
-"""Ranking of causes: how loud each is (pull) and how much it would change the answer (impact), one row a cause.
+"""Ranking of causes: how clearly each shows (pull) and how much it would change the answer (impact), one row a cause.
 
 Pull is the score z of the omitted cause, about N(0, 1) if it is absent. Impact is the relative shift of f_EI if the
 cause is put into the model. The two are unrelated, so both stand side by side, as in the rankings of particle

@@ -269,7 +269,7 @@ def start(
 
 
 def bent_at_rest(test: MeasuredTest) -> float | None:
-    """Size of K0, 1/m, by how far apart the axes stood at rest; None where nobody tells."""
+    """Size of K0, 1/m, by how far apart the axes stood at rest; None where no photo or log tells it."""
     chords = [step.chord for step in test.steps if step.branch == "mounted" and step.chord is not None]
     logged = [(step.chord, step.displacement) for step in test.steps]
     chords = chords or [chord + moved for chord, moved in logged if chord is not None and moved is not None]

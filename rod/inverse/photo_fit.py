@@ -49,7 +49,7 @@ def photo_fit(observation: Observation, fitted: Fit, photo: PhotoData, of: Midli
 
 
 def distance_std(photo: PhotoData, shape: MeasuredShape) -> Array:
-    """Standard deviation (n,) m of `photo_fit`'s distance to the smooth curve of a photo: what its axes leave of it."""
+    """Standard deviation (n,) m of `photo_fit`'s distance to the smooth curve of a photo, errors of its axes apart."""
     sections = np.column_stack([np.interp(photo.sections.s, shape.s, column) for column in shape.basis_normal.T])
     taken = by_axes(shape, photo.chord)[1:] @ _likeliest(photo) @ photo.whiten[:, 1:]
     left = shape.basis_normal - taken @ sections
