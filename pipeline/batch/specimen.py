@@ -21,7 +21,7 @@ from pipeline.batch.processes import deadline
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
-from pipeline.messages import Message, free_text
+from pipeline.messages import Message, by_system, free_text
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
 from pipeline.result.row import as_entry, index_row
 from pipeline.settings import Settings
@@ -135,7 +135,7 @@ def refusals(error: Exception) -> list[FindingPart]:
     if isinstance(error, MemoryError):
         said = Message("specimen/memory")
     elif isinstance(error, OSError):
-        said = Message("specimen/file-system", why=error.strerror or str(error))
+        said = Message("specimen/file-system", why=by_system(error))
     else:
         told = " ".join(str(error).split())[:300]
         said = Message("specimen/program-error", error=type(error).__name__, told=told)

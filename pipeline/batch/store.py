@@ -25,7 +25,7 @@ import locket
 
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
-from pipeline.messages import Message
+from pipeline.messages import Message, by_system
 from pipeline.report.files import synced, write_atomic
 
 ENTRY = "entry.json"
@@ -77,8 +77,7 @@ class Store:
 
     def unwritable(self, error: OSError) -> InputError:
         """The error for an output folder that refuses to be written."""
-        why = (error.strerror or type(error).__name__).lower()
-        return InputError(Message("out/unwritable", why=why), path=self.out)
+        return InputError(Message("out/unwritable", why=by_system(error)), path=self.out)
 
     def _work(self, name: str) -> Path:
         return self.out / WORK / name

@@ -13,7 +13,7 @@ import stat
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.messages import Message
+from pipeline.messages import Message, by_system
 
 LONGEST_PATH = 1000
 """Characters of a path written in a file; each folder in it is looked up, and no system opens one of a few thousand."""
@@ -92,4 +92,4 @@ def outside(path: Path, name: str, line: int | None = None) -> InputError:
 
 def unreadable(path: Path, error: OSError) -> InputError:
     """The error for a file the operating system does not hand over."""
-    return InputError(Message("file/unreadable", why=(error.strerror or type(error).__name__).lower()), path=path)
+    return InputError(Message("file/unreadable", why=by_system(error)), path=path)

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.errors import InputError
-from pipeline.messages import Message
+from pipeline.messages import Message, by_system
 from pipeline.result.diagnosed import CauseForm
 from pipeline.result.whole import SCHEMA, Result
 
@@ -66,10 +66,10 @@ def _other_version(error: Exception) -> str:
     return named if isinstance(named, str) and named.startswith(FAMILY) else ""
 
 
-def _told(error: Exception) -> str:
+def _told(error: Exception) -> str | Message:
     """What is wrong with a file, in a few words: of a file of another kind, or with a wrong value, where."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror.lower()
+    if isinstance(error, OSError):
+        return by_system(error)
     if not isinstance(error, ValidationError) or error.errors()[0]["type"] == "json_invalid":
         return str(error) if type(error) is ValueError else type(error).__name__
     first = error.errors(include_url=False, include_input=False)[0]
