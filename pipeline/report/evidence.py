@@ -223,7 +223,7 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
 def photos_note(result: Result, words: Words) -> str:
     """What the standard deviations in the table of photos leave out, because all photos share it."""
     scale = result.scale
-    if scale is None:
+    if scale is None or not any(photo.s_m for photo in result.photos):
         return ""
     common = [words("photos_scale", percent=words.number(100.0 * scale.std_relative, 2))]
     if scale.axis_parallax_std > 0.0:
