@@ -11,6 +11,7 @@ from pipeline.report.words import Words
 from pipeline.result import Result, leading, set_aside, trusted
 from pipeline.result.answer import refusal
 from pipeline.result.headline import opening
+from pipeline.rounding import p_value
 from pipeline.settings import ReportSettings
 
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
@@ -125,7 +126,8 @@ def _agreement(result: Result, words: Words) -> str:
     noise = np.hypot(np.interp(grid, one.kappa, one.tangent_std), np.interp(grid, two.kappa, two.tangent_std))
     expected = float(np.sqrt(np.mean((noise / mean) ** 2)))
     key = "agree_no" if not part.compatible else "agree_wide" if expected > WIDE else "agree_yes"
-    return words(key, rms=rms, expected=words.number(100.0 * expected, 2), p=words.probability(part.p_value or 0.0))
+    chance = p_value(part.p_value or 0.0, decimal=words.decimal)
+    return words(key, rms=rms, expected=words.number(100.0 * expected, 2), p=chance)
 
 
 def _advice(result: Result, words: Words) -> str:

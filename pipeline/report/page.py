@@ -34,7 +34,7 @@ PALETTE = {
 }
 
 BETWEEN = re.compile(
-    r" (?=±)|(?<=±) |(?<=\d) (?=%|1/m|px|mm|µm|mN|N\b)|(?<=\bp) (?=[<=])|(?<=[<=]) (?=\d)|(?<=N) (?=m(?![a-z]))|(?<=\bs) (?==)"
+    r" (?=±)|(?<=±) |(?<=\d) (?=%|1/m|px|mm|µm|mN|N\b)|(?<=\b[ps]) (?=[<=])|(?<=[<=]) (?=\d)|(?<=N) (?=m(?![a-z]))"
 )
 """Spaces inside a quantity: a number, its standard deviation and unit, a p value, units multiplied, a place s."""
 
