@@ -277,7 +277,7 @@ def _wild(forces: Array, runs: Sequence[Run]) -> list[int]:
 def _fit_findings(
     fitted: HoldForces, places: HoldPlaces, tolerance: float, name: str, settings: IntakeSettings
 ) -> Iterator[Finding]:
-    """What is no plain mean of a hold: how forces and their errors were found, displacements that scatter."""
+    """Findings on how forces and their errors were taken from the holds, and on displacements that scatter."""
     if fitted.degree:
         yield inferred("log/trend", file=name, degree=fitted.degree)
     if not fitted.sampled:

@@ -38,7 +38,7 @@ def read_hints(source: TomlFile) -> dict[str, PhotoHints]:
 def obeyed(
     steps: tuple[LoadStep, ...], hints: dict[str, PhotoHints]
 ) -> tuple[tuple[LoadStep, ...], tuple[Finding, ...]]:
-    """Steps without the photos that are to be left out, and what there is to tell of the hints."""
+    """Steps without the photos that hints leave out, and findings about the hints."""
     there = {step.image for step in steps}
     without = {name for name, hint in hints.items() if not hint.use and name in there}
     findings = [

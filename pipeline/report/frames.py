@@ -105,7 +105,8 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
     radius = smallest_radius(result)
     if radius is not None:
         rows.append(("smallest_bend_radius_seen", radius[0], radius[1], "m", f"photo of step {radius[2]}"))
-    for cause in result.diagnosis.causes if result.diagnosis else []:
+    part = result.diagnosis
+    for cause in part.causes if part is not None and part.verdict != "unexplained" else []:
         apart = "are without it" if result.answer.method == "extended" else "contain what it does"
         share = "> 0.99" if cause.probability > 0.99 else f"{cause.probability:.2g}"
         note = f"probability {share}; the numbers above {apart}"
