@@ -113,7 +113,7 @@ Way = TypeVar("Way", InversePart, BalancePart)
 
 
 def with_all_believed(part: Way, widening: Widening | None) -> Way:
-    """The curve of the way that answers with all that the diagnosis believes in its band."""
+    """The curve of the answer with all hypotheses of the diagnosis in its band."""
     if widening is None or part.curve is None or part.pre_curvature_std_per_m is None:
         return part
     more = float(np.linalg.norm(widening.pre_curvature_factor_per_m))

@@ -119,10 +119,7 @@ class LawBasis:
 def moment_basis(low: float, high: float, *, unit: float, size: int = COEFFICIENTS) -> LawBasis:
     """Basis over the moments [min(low, 0), max(high, 0)] N m with xi the share of the moment.
 
-    Raises
-    ------
-    ValueError
-        If all moments are zero.
+    Raises `ValueError` if all moments are zero.
     """
     low, high = _with_rest(low, high)
     span = high - low

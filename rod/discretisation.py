@@ -130,10 +130,7 @@ class Rod:
     def stiffness_scale(self) -> float:
         """Typical bending stiffness, N m^2: size of the law times the largest profile value.
 
-        Raises
-        ------
-        ValueError
-            If that is not positive: without stiffness nothing has a scale.
+        Raises `ValueError` if that is not positive: without stiffness nothing has a scale.
         """
         profile = self.section.profile
         scale = self.section.law.stiffness_scale * (1.0 if profile is None else float(np.max(np.abs(profile))))
@@ -247,10 +244,7 @@ Along = float | Array | Callable[[Array], ArrayLike]
 def joint_values(values: Along, elements: Array, *, name: str) -> Array:
     """Values at the joints: a number, (n + 1,) values, or a function of the relative position 0..1 on the free cable.
 
-    Raises
-    ------
-    ValueError
-        For another shape, or values that are not finite; the message carries ``name``.
+    Raises `ValueError` for another shape, or values that are not finite; the message carries ``name``.
     """
     position = np.concatenate(([0.0], np.cumsum(elements)))
     given = np.asarray(values(position) if callable(values) else values, float)

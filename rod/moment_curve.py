@@ -1,4 +1,4 @@
-"""What answers as a moment curve m(K, K0), and laws of the bend K - K0 alone: points with tangents, cubic between them.
+"""Moment curves m(K, K0) as a protocol, and laws of the bend K - K0 alone: points with tangents, cubic between them.
 
 `rod.compliance_law` and `rod.stiffness_law` say how the points come from coefficients.
 
@@ -54,7 +54,7 @@ def moment_curve(K: Array, m: Array, f: Array) -> CubicCurve:
 
 
 class MomentCurve(Protocol):
-    """Anything that answers as a moment curve, by its ``bound``; ``K`` (n,) in 1/m, ``K0`` scalar or (n,) in 1/m."""
+    """Moment and tangent over the curvature ``K`` (n,) 1/m, for a pre-curvature ``K0``, one or (n,) 1/m."""
 
     @property
     def stiffness_scale(self) -> float:

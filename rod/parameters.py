@@ -152,11 +152,8 @@ NAMES = ("ordinates", *_ALONG, *_SCALARS)
 def directions(test: BendingTest, parameters: Sequence[Parameter]) -> Directions:
     """Directions of the ``parameters`` at ``test``.
 
-    Raises
-    ------
-    ValueError
-        For an unknown name, values of the wrong shape or where none belong, ordinates of a law that has none, or a test
-        to go toward that is of another kind.
+    Raises `ValueError` for an unknown name, values of the wrong shape or where none belong, ordinates of a law that has
+    none, or a test to go toward that is of another kind.
     """
     names = tuple(name for parameter in parameters for name in _columns(test, parameter))
     joints, friction, law = test.rod.section.pre_curvature.size, test.friction, test.characteristic

@@ -1,4 +1,4 @@
-"""What a cross-section answers to its curvature: law, stiffness profile, internal friction, plastic set, and memory.
+"""Moment of a cross-section at its curvature: law, stiffness profile, internal friction, plastic set, and memory.
 
 From curvature K (1/m) at the joints of the discrete rod to moment m (N m) and tangent dm/dK (N m^2):
 

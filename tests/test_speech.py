@@ -41,6 +41,11 @@ def test_check_speaks_german(code, told):
     assert told in done.output and "Fehler" in done.output and "error" not in done.output
 
 
+def test_a_folder_that_is_not_there_is_missed_in_one_language():
+    assert "'no-such' gibt es nicht" in (said := call("report", "no-such", "--language", "de").output)
+    assert "irectory" not in said
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_is_german_wherever_the_language_is_asked_for(name):
     said = {call(*order).output for order in ([name, "--help", "--language", "de"], ["--language=de", name, "-h"])}

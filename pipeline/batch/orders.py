@@ -116,7 +116,7 @@ def _id(folder: Path, settings: Settings) -> str:
 
 def fingerprint(specimen: Specimen, order: Order) -> str:
     """Digest of everything a result depends on: contents of the files, what was inferred, settings, program."""
-    settings = order.settings.model_dump(mode="json", exclude={"batch"})
+    settings = order.settings.model_dump(mode="json", exclude={"batch": True, "report": {"language"}})
     told = [[finding.code, finding.message] for finding in specimen.findings]
     parts = [dict(sorted(specimen.hashes.items())), told, specimen.id, settings, order.version]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -172,11 +172,7 @@ def _begun(by_value: bytes) -> _Worker:
 
 @contextlib.contextmanager
 def _inherited() -> Iterator[None]:
-    """What a worker has from its first line on: one thread a library, and no Ctrl-C.
-
-    A terminal sends the interrupt to all processes of a command: the one in front ends the batch in order, and a worker
-    that took it too would say so at length.
-    """
+    """What a worker has from its first line on: one thread a library, and no Ctrl-C, which its parent acts on."""
     unset = ONE_THREAD.keys() - os.environ.keys()
     os.environ.update({name: ONE_THREAD[name] for name in unset})
     masks = hasattr(signal, "pthread_sigmask")  # not on Windows

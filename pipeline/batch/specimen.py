@@ -21,7 +21,7 @@ from pipeline.batch.processes import deadline
 from pipeline.batch.store import Store, write_entry
 from pipeline.errors import InputError
 from pipeline.intake.folder import read_specimen
-from pipeline.messages import Message, free_text
+from pipeline.messages import Message, by_system, free_text
 from pipeline.result import FindingPart, Result, SpecimenPart, read_result, schema, to_json
 from pipeline.result.row import as_entry, index_row
 from pipeline.settings import Settings
@@ -135,7 +135,7 @@ def refusals(error: Exception) -> list[FindingPart]:
     if isinstance(error, MemoryError):
         said = Message("specimen/memory")
     elif isinstance(error, OSError):
-        said = Message("specimen/file-system", why=error.strerror or str(error))
+        said = Message("specimen/file-system", why=by_system(error))
     else:
         told = " ".join(str(error).split())[:300]
         said = Message("specimen/program-error", error=type(error).__name__, told=told)
@@ -166,7 +166,7 @@ def _measured(store: Store, order: Order, stages: Stages, started: float, doing:
     stored = store.entry(order.name)
     if stored is not None and stored.get("fingerprint") == mark:
         with contextlib.suppress(OSError, ValueError, InputError):  # a stored result that is none is measured anew
-            if order.settings.batch.reports and not stored.get("reports", True):
+            if order.settings.batch.reports and stored.get("reports") != order.settings.report.language:
                 draw_again(store, order.name, read_result(store.out / order.name), stages, order.settings)
             told = str(stored.get("headline", ""))
             usable = stored.get("state") != "unusable"
@@ -183,11 +183,16 @@ def _measured(store: Store, order: Order, stages: Stages, started: float, doing:
     return Outcome(order.name, result.status, entry["headline"], False, took, usable=usable)
 
 
+def _language_drawn(settings: Settings) -> str:
+    """Language of the reports that are drawn; empty where none are."""
+    return settings.report.language if settings.batch.reports else ""
+
+
 def draw_again(store: Store, name: str, result: Result, stages: Stages, settings: Settings) -> None:
     """Write tables and reports of a stored result again, without measuring."""
     with store.staging() as staged:
         stages.write(result, staged, settings)
-        told = {"reports": settings.batch.reports, **_in_index(result)}
+        told = {"reports": _language_drawn(settings), **_in_index(result)}
         write_entry((store.entry(name) or {}) | told, staged)
         store.install(staged, name)
 
@@ -209,7 +214,7 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
         "headline": result.headline or (reasons[0].message if reasons else ""),
         "said": _said(result),
         "code": reasons[0].code if reasons else None,
-        "reports": order.settings.batch.reports,
+        "reports": _language_drawn(order.settings),
         **_in_index(result),
         "fingerprint": mark,  # empty where the measurement did not come to an end: the next run tries again
     }
@@ -227,12 +232,7 @@ def _said(result: Result) -> dict[str, Any]:
 def store_failure(order: Order, findings: list[FindingPart], started: float, *, trace: str | None = None) -> Outcome:
     """Store a specimen that could not be measured, with its reason; if even that fails the outcome carries it.
 
-    Parameters
-    ----------
-    started : float
-        s, `time.monotonic` when the specimen was begun.
-    trace : str, optional
-        Where in the program it failed, kept in the provenance.
+    ``started``: `time.monotonic` at its begin, s; ``trace``: where in the program it failed, for the provenance.
     """
     store = Store(order.out)
     result = failed_result(order, findings, trace)

@@ -25,7 +25,7 @@ import locket
 
 from pipeline.errors import InputError
 from pipeline.intake.photos import natural_key
-from pipeline.messages import Message
+from pipeline.messages import Message, by_system
 from pipeline.report.files import synced, write_atomic
 
 ENTRY = "entry.json"
@@ -43,10 +43,7 @@ class Store:
     def locked(self) -> Iterator[None]:
         """Hold the folder for one run; what an earlier, killed run left ready is put in place, half done is removed.
 
-        Raises
-        ------
-        InputError
-            ``out/busy`` if another run holds it, ``out/unwritable`` if it cannot be written.
+        Raises `InputError` ``out/busy`` if another run holds it, ``out/unwritable`` if it cannot be written.
         """
         try:
             self._work("ready").mkdir(parents=True, exist_ok=True)
@@ -80,8 +77,7 @@ class Store:
 
     def unwritable(self, error: OSError) -> InputError:
         """The error for an output folder that refuses to be written."""
-        why = (error.strerror or type(error).__name__).lower()
-        return InputError(Message("out/unwritable", why=why), path=self.out)
+        return InputError(Message("out/unwritable", why=by_system(error)), path=self.out)
 
     def _work(self, name: str) -> Path:
         return self.out / WORK / name
@@ -103,10 +99,7 @@ class Store:
     def place(self, name: str) -> Path:
         """Where a result goes.
 
-        Raises
-        ------
-        InputError
-            ``out/foreign-folder`` if the place holds something that is no result: it is left alone.
+        Raises `InputError` ``out/foreign-folder`` if the place holds something that is no result: it is left alone.
         """
         place = self.out / name
         if self._foreign(place):

@@ -47,10 +47,7 @@ def check(ctx: click.Context, folders: tuple[Path, ...], timeout: float | None, 
 
 
 def checked_all(folders: list[Path], settings: Settings) -> list[dict[str, Any]]:
-    """What a run would find in each folder, each within the time that a specimen has.
-
-    In this process where there is only one and no limit was asked for, as a run does it.
-    """
+    """What a run would find in each folder, each within its time; one without a limit is read in this process."""
     from pipeline.batch.processes import in_processes
 
     limit = settings.batch

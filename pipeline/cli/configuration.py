@@ -25,10 +25,8 @@ LARGEST = 2**63  # integers of TOML end there; of 5,000 digits, given in hexadec
 def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
     """Settings from a file, changed by assignments.
 
-    Raises
-    ------
-    InputError
-        ``settings/unknown-key``, ``settings/wrong-value``, ``settings/assignment``, and those of `read_toml`.
+    Raises `InputError` ``settings/unknown-key``, ``settings/wrong-value``, ``settings/assignment``, and those of
+    `read_toml`.
     """
     tables: dict[str, Any] = {}
     source: TomlFile | None = None

@@ -15,7 +15,7 @@ from pipeline.cli.options import language_option
 from pipeline.cli.speech import note, refuse
 from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
-from pipeline.messages import Message
+from pipeline.messages import Message, by_system
 from pipeline.threads import one_thread
 
 # command -> module of this room; each module has a function of the command's name
@@ -68,8 +68,7 @@ class Commands(Spoken, click.Group):
         except OSError as error:
             if error.filename is None:  # a closed pipe, not a place the user named
                 raise
-            why = (error.strerror or type(error).__name__).lower()
-            note(Message("cli.no-place", path=error.filename, why=why))
+            note(Message("cli.no-place", path=error.filename, why=by_system(error)))
             ctx.exit(2)
 
 

@@ -40,7 +40,7 @@ REFITTED = 3
 
 
 class Diagnosed(NamedTuple):
-    """Part of the result, all findings (faults of the data, how the search went), and what is wrong with the data."""
+    """The part of the result, all findings, and what is wrong with the data."""
 
     part: DiagnosisPart
     findings: tuple[Finding, ...]
@@ -84,7 +84,7 @@ def diagnose(
 
 
 def _not_to_be_compared(faults: Faults, identification: Identification | None) -> Message | None:
-    """Why nothing can be held against the simulation; None if something can."""
+    """Why nothing measured can be compared with the simulation; None where something can."""
     if not faults.loaded_photos():
         return Message("diagnosis.no-photo")
     if not any(step.force for step in faults.test.steps):
@@ -97,15 +97,14 @@ def _not_to_be_compared(faults: Faults, identification: Identification | None) -
 
 
 def conclude(bench: Workbench) -> Conclusion:
-    """Refit suspects and pairs of them, and say what is believed."""
+    """Refit the causes and pairs of causes that matter, and weigh them all."""
     return conclusion_of(bench, searched(bench))
 
 
 class _Beside(NamedTuple):
-    """What is believed of displacements and rig beside what was concluded.
+    """Ordinary errors of displacements and rig beside the concluded model.
 
-    ``shown``: the model that was concluded, fitted with that; None where it is the model itself. ``findings``: what is
-    told of both.
+    ``shown``: that model fitted with them; None where it is the same. ``findings``: what is reported of both.
     """
 
     shown: Fit | None
@@ -113,7 +112,7 @@ class _Beside(NamedTuple):
 
 
 def _beside(bench: Workbench, conclusion: Conclusion) -> _Beside:
-    """The model that was concluded with displacements that scatter and a rig as rigs are where that is likelier."""
+    """The concluded model with ordinary errors of displacements and rig, where these are likelier than none."""
     fitted, findings = conclusion.fitted(bench), list[Finding]()
     if conclusion.unmodelled:
         return _Beside(None, ())
@@ -138,10 +137,7 @@ def _told(correction: ForceCorrection) -> ForceCorrectionPart:
 
 
 def _stands_still(test: MeasuredTest) -> bool:
-    """Whether all displacements of the log are zero, or the same while the photographed chord changes.
-
-    The displacement is what drives the simulation; the chords, which both ways live on, are held against it.
-    """
+    """Whether all displacements of the log are zero, or the same while the photographed chord changes."""
     logged = {step.displacement for step in test.steps if step.displacement is not None}
     chords = [step.chord for step in test.steps if step.chord is not None]
     std = max((step.chord_std or CHORD_STD * test.length for step in test.steps), default=0.0)
@@ -161,10 +157,7 @@ def _data_at_fault(bench: Workbench) -> Faults | None:
 
 
 def _causes_leave(bench: Workbench, most: float) -> bool:
-    """Whether a cause or a pair of causes leaves at most that chi-square once it is refitted.
-
-    Scores are linear ones: about a base model that is far off they promise more than a cause can do, or less.
-    """
+    """Whether a cause or a pair of causes, refitted (scores are linear), leaves at most that chi-square."""
     suspicion = bench.suspicion
     single = (
         refit_one(bench.observation, bench.base, suspicion, cause, rival=most)

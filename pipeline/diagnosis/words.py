@@ -53,10 +53,7 @@ def headline(
 
 
 def could_have_been_seen(seen: Sequence[CauseRow], total: int) -> Message:
-    """What the data could have shown: the first three of the causes ``seen`` at a plausible size, of ``total``.
-
-    The amount told is one that shows in every form of the cause, where there is such.
-    """
+    """What the data could have shown: the first three of the causes ``seen`` at a plausible size, of ``total``."""
     if not seen:
         return Message("diagnosis.seen-none", total=total)
     least = ((r, (r.detectable_in_any_form or r.minimal_detectable or 0.0, None, r.unit)) for r in seen[:3])

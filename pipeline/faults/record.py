@@ -89,7 +89,7 @@ class Faults:
         return [i for i, step in steps if step.branch != "mounted" and step.force and i not in self.forces]
 
     def joined(self, other: Faults) -> Faults:
-        """Both."""
+        """The faults of both."""
         return Faults(
             other.test,
             (*self.findings, *other.findings),

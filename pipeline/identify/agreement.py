@@ -99,10 +99,7 @@ def _on(kappa: Array, other: Array, columns: Array) -> Array:
 
 
 def difference_covariance(one: MeasuredLaw, two: MeasuredLaw, laws: tuple[Array, Array], grid: Array) -> Array:
-    """Covariance of the difference of two ways, mean over each part of the grid, (parts, parts); see the module.
-
-    `laws` are those sent through both, each on the way's own grid, (n, p).
-    """
+    """Covariance (parts, parts) of the difference of two ways; ``laws`` (n, p) go through both, see the module."""
     first, second = log_curve(one).contraction(grid), log_curve(two).contraction(grid)
     short = first @ one.shortfall @ laws[0] - second @ two.shortfall @ laws[1]
     total: Array = short @ short.T + DISCRETE**2 * np.eye(len(short))

@@ -25,7 +25,7 @@ from rod.compliance_law import ComplianceLaw
 from rod.inverse import Estimate, InverseOutcome
 from rod.inverse.laws import FreeLaw
 from rod.inverse.observation import KINDS
-from rod.inverse.photo_fit import photo_fit
+from rod.inverse.photo_fit import distance_std, photo_fit
 from rod.measured_law import MeasuredLaw
 
 READINGS = 8
@@ -216,9 +216,8 @@ def _photos(way: Estimate) -> dict[int, PhotoResidual]:
         step = test.steps[photo.step]
         if (shape := step.shape) is None:
             continue
-        variance = np.einsum("ip,pq,iq->i", shape.basis_normal, shape.covariance, shape.basis_normal)
         at = photo_fit(observation, fitted, photo, shape)
-        std = np.sqrt(np.maximum(variance, 0.0))
+        std = distance_std(photo, shape)
         found[step.step] = PhotoResidual(at.kappa.tolist(), at.distance.tolist(), std.tolist())
     return found
 

@@ -13,7 +13,7 @@ import stat
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.messages import Message
+from pipeline.messages import Message, by_system
 
 LONGEST_PATH = 1000
 """Characters of a path written in a file; each folder in it is looked up, and no system opens one of a few thousand."""
@@ -51,10 +51,7 @@ def is_folder(path: Path) -> bool:
 def read_bytes(path: Path, *, limit: int, setting: str) -> bytes:
     """Contents of a regular file of at most ``limit`` bytes.
 
-    Raises
-    ------
-    InputError
-        ``file/unreadable``, ``file/not-a-file``, ``file/too-large``.
+    Raises `InputError` ``file/unreadable``, ``file/not-a-file``, ``file/too-large``.
     """
     check_file(path, limit=limit, setting=setting)
     try:
@@ -80,13 +77,7 @@ def check_file(path: Path, *, limit: int, setting: str) -> None:
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file, read in pieces.
-
-    Raises
-    ------
-    InputError
-        ``file/unreadable``.
-    """
+    """SHA-256 of a file, read in pieces; raises `InputError` ``file/unreadable``."""
     try:
         with path.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
@@ -101,4 +92,4 @@ def outside(path: Path, name: str, line: int | None = None) -> InputError:
 
 def unreadable(path: Path, error: OSError) -> InputError:
     """The error for a file the operating system does not hand over."""
-    return InputError(Message("file/unreadable", why=(error.strerror or type(error).__name__).lower()), path=path)
+    return InputError(Message("file/unreadable", why=by_system(error)), path=path)

@@ -22,27 +22,9 @@ WITH_UNIT = re.compile(r"(?P<number>[-+−]?[\d.,\s'’]*\d(?:[eE][-+]?\d+)?)\s*
 def without_units(
     table: dict[str, list[str]], columns: Columns, *, path: Path, line: int | None
 ) -> tuple[dict[str, list[str]], Columns]:
-    """Cells without their units, and the columns with them.
+    """Cells (role -> cells) without their units, and the columns with them; ``line``: the first one of the table.
 
-    Parameters
-    ----------
-    table : dict
-        Role -> cells.
-    columns : Columns
-    path : Path
-        Of the log.
-    line : int, optional
-        First line of the table.
-
-    Returns
-    -------
-    dict, Columns
-        As they came where no column has units in its cells.
-
-    Raises
-    ------
-    InputError
-        ``log/unit``: the unit is not known, or the header says another.
+    Raises `InputError` ``log/unit`` where the unit is not known, or the header says another.
     """
     for role in MEASURED:
         found = _split(table.get(role, ()))

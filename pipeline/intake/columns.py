@@ -206,10 +206,7 @@ def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:
 def factor_of(role: str, unit: str, path: Path, line: int | None) -> float:
     """SI units per unit; capitals matter (mN, MN) unless only one reading exists (KN, MM, SEC).
 
-    Raises
-    ------
-    InputError
-        ``log/unit``.
+    Raises `InputError` ``log/unit``.
     """
     unit = SPELLED.get(unit.casefold(), unit or ASSUMED[role]).replace(
         "μ", "µ"

@@ -56,10 +56,7 @@ def decode(data: bytes, *, path: Path, encoding: str | None = None) -> tuple[str
     UTF-16 without byte order mark shows as zero bytes at every other place; text that is not UTF-8 is taken as cp1252,
     the encoding of western Windows programs.
 
-    Raises
-    ------
-    InputError
-        ``log/encoding`` if the bytes are no text.
+    Raises `InputError` ``log/encoding`` if the bytes are no text.
     """
     for begin, kind in OTHER_FILES.items():
         if data.startswith(begin):

@@ -39,11 +39,8 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
     Links to folders are followed, but no folder is searched twice, and a specimen folder not further. A folder that
     cannot be looked into is among them, so that reading it tells what is in the way.
 
-    Raises
-    ------
-    InputError
-        ``folder/missing`` for a path that is no folder, ``file/unreadable`` for one that cannot be looked at,
-        ``folder/no-specimen`` if there is none in one of the paths.
+    Raises `InputError` ``folder/missing`` for a path that is no folder, ``file/unreadable`` for one that cannot be
+    looked at, ``folder/no-specimen`` if there is none in one of the paths.
     """
     found: dict[Path, None] = {}
     for path in paths:
@@ -235,10 +232,7 @@ def _calibration_photos(
 ) -> tuple[dict[str, str], list[Finding]]:
     """Hashes of the calibration photos, and what is wrong with some of them.
 
-    Raises
-    ------
-    InputError
-        ``camera/no-calibration-photos``, ``file/outside``.
+    Raises `InputError` ``camera/no-calibration-photos``, ``file/outside``.
     """
     if place is None:
         return {}, []

@@ -163,8 +163,7 @@ def _p_value(rss: float, freedom: int, rss_more: float, freedom_more: int) -> fl
 def _left_over(holds: Sequence[Hold], fits: Sequence[_Fit], sigmas: Sequence[float], degree: int) -> float:
     """What a trend of one degree more would still change at the photos, rms over the holds beyond its own noise, in N.
 
-    A relaxation is no polynomial: what is too small to be asked for is still there. Without any trend there is nothing
-    to leave over.
+    A relaxation is no polynomial; without any trend nothing is left over.
     """
     if degree == 0:
         return 0.0

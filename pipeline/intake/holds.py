@@ -69,11 +69,8 @@ def load_steps(
 ) -> tuple[tuple[LoadStep, ...], tuple[Finding, ...]]:
     """Group the samples into steps.
 
-    Raises
-    ------
-    InputError
-        ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters,
-        ``log/too-many-steps``.
+    Raises `InputError` ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters,
+    ``log/too-many-steps``.
     """
     name = path.name
     displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
@@ -280,7 +277,7 @@ def _wild(forces: Array, runs: Sequence[Run]) -> list[int]:
 def _fit_findings(
     fitted: HoldForces, places: HoldPlaces, tolerance: float, name: str, settings: IntakeSettings
 ) -> Iterator[Finding]:
-    """What is no plain mean of a hold: how forces and their errors were found, displacements that scatter."""
+    """Findings on how forces and their errors were taken from the holds, and on displacements that scatter."""
     if fitted.degree:
         yield inferred("log/trend", file=name, degree=fitted.degree)
     if not fitted.sampled:
@@ -307,17 +304,7 @@ def _hold_findings(
 
 
 def order_findings(steps: Sequence[LoadStep], tolerance: float, *, name: str) -> Iterator[Finding]:
-    """Contradictions between neighbouring steps.
-
-    Parameters
-    ----------
-    steps : sequence of LoadStep
-        In the order of the log.
-    tolerance : float
-        m, displacements that close are equal.
-    name : str
-        Of the log, for the messages.
-    """
+    """Contradictions between neighbouring steps; displacements closer than ``tolerance`` (m) are equal."""
     for before, after in pairwise(steps):
         change = after.displacement_m - before.displacement_m
         place = {"file": name, "line": after.line, "step": after.step, "before": before.step}

@@ -20,10 +20,7 @@ MOST_POINTS = 10_000
 def read_hints(source: TomlFile) -> dict[str, PhotoHints]:
     """Hints by the photo's name relative to the folder.
 
-    Raises
-    ------
-    InputError
-        ``toml/unknown-key``, ``toml/wrong-value``, ``toml/missing-key``.
+    Raises `InputError` ``toml/unknown-key``, ``toml/wrong-value``, ``toml/missing-key``.
     """
     tables = source.tables.get("photos", [])
     if not isinstance(tables, list) or any(not isinstance(table, dict) for table in tables):
@@ -41,7 +38,7 @@ def read_hints(source: TomlFile) -> dict[str, PhotoHints]:
 def obeyed(
     steps: tuple[LoadStep, ...], hints: dict[str, PhotoHints]
 ) -> tuple[tuple[LoadStep, ...], tuple[Finding, ...]]:
-    """Steps without the photos that are to be left out, and what there is to tell of the hints."""
+    """Steps without the photos that hints leave out, and findings about the hints."""
     there = {step.image for step in steps}
     without = {name for name, hint in hints.items() if not hint.use and name in there}
     findings = [

@@ -50,10 +50,7 @@ def list_photos(folder: Path, *, without: Path | None, settings: IntakeSettings)
     Photos lie in ``images`` (or a folder of the like, see ``FOLDERS``), or in the only folder within it that holds any,
     or beside ``specimen.toml``.
 
-    Raises
-    ------
-    InputError
-        ``folder/too-many-photos``.
+    Raises `InputError` ``folder/too-many-photos``.
     """
     names = [
         str(PurePosixPath(place) / entry)
@@ -141,11 +138,8 @@ def match_photos(
 ) -> FoundPhotos:
     """Find the photo of each step.
 
-    Raises
-    ------
-    InputError
-        ``folder/no-photos`` if there is none at all, ``log/photos-ambiguous`` if the log names none and the number of
-        photos does not fit the steps.
+    Raises `InputError` ``folder/no-photos`` if there is none at all, ``log/photos-ambiguous`` if the log names none and
+    the number of photos does not fit the steps.
     """
     present = list_photos(folder, without=calibration, settings=settings)
     findings: list[Finding] = []

@@ -27,13 +27,7 @@ length, for a travel of 2 % at least three times this."""
 
 
 def check_response(steps: Sequence[LoadStep], *, path: Path) -> None:
-    """Refuse a log whose force stands still while the bearing moves.
-
-    Raises
-    ------
-    InputError
-        ``log/force-stands-still``.
-    """
+    """Refuse a log whose force stands still while the bearing moves; raises `InputError` ``log/force-stands-still``."""
     loaded = [step for step in steps if step.branch != "mounted"]
     still = steps if len(loaded) < len(steps) and _one_force(steps) else loaded
     places = [step.displacement_m for step in still]

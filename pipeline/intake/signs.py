@@ -85,15 +85,7 @@ def force_sign(forces: Array, displacements: Array, spec: LogSpec, *, name: str)
 def inferred_branches(
     displacements: Sequence[float], forces: Sequence[float], tolerance: float, *, name: str
 ) -> tuple[list[Branch], list[Finding]]:
-    """Branch of each hold by the order of the displacements.
-
-    Parameters
-    ----------
-    displacements, forces : (k,) m, N
-        Of each hold, signed.
-    tolerance : float
-        m, displacements that close are equal.
-    """
+    """Branch of each hold by the order of its displacements (k,) m; those closer than ``tolerance`` (m) are equal."""
     branches: list[Branch] = []
     largest = max(abs(force) for force in forces)
     for number, position in enumerate(displacements):

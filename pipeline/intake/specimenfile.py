@@ -67,13 +67,7 @@ def read_specimen_file(folder: Path, settings: IntakeSettings) -> Specimen:
 
 
 def read_source(folder: Path, settings: IntakeSettings) -> TomlFile:
-    """Parse ``specimen.toml`` of a folder.
-
-    Raises
-    ------
-    InputError
-        ``file/...``, ``toml/encoding`` and ``toml/syntax``.
-    """
+    """Parse ``specimen.toml`` of a folder; raises `InputError` ``file/...``, ``toml/encoding`` and ``toml/syntax``."""
     path = inside(folder, NAME, allow_outside=settings.allow_outside)
     if path is None:
         raise outside(folder / NAME, NAME)
@@ -83,10 +77,8 @@ def read_source(folder: Path, settings: IntakeSettings) -> TomlFile:
 def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> Specimen:
     """What a ``specimen.toml`` says of its specimen; of what the force log is, `asked_of_log` tells.
 
-    Raises
-    ------
-    InputError
-        ``toml/...``, ``file/outside``, ``camera/...``: unknown or missing key, value that cannot be meant; all at once.
+    Raises `InputError` ``toml/...``, ``file/outside``, ``camera/...``: unknown or missing key, value that cannot be
+    meant; all at once.
     """
     wrong = Complaints()
     wrong.kept(check_names, source, source.tables, (*CHECKS, "photos"))

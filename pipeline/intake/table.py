@@ -58,13 +58,7 @@ class Table:
 
 
 def read_table(rows: Rows, columns: Columns, path: Path) -> Table:
-    """Split the rows below the header.
-
-    Raises
-    ------
-    InputError
-        ``log/row-length``.
-    """
+    """Split the rows below the header; raises `InputError` ``log/row-length``."""
     table, surplus = _split(rows, columns)
     end = _end_of_samples(table, columns)
     if surplus < end:
@@ -100,10 +94,7 @@ def _split(rows: Rows, columns: Columns) -> tuple[Table, int]:
 
 
 def _end_of_samples(table: Table, columns: Columns) -> int:
-    """Where rows begin that are no samples: a mean or a remark below a table that is full above it.
-
-    Without a displacement where all rows above have one, or with the name of a mean where they have a number.
-    """
+    """Where means and remarks begin below the samples: no displacement, or the name of a mean in place of a number."""
     end = len(table.places)
     while end and _is_summary(table.rows[table.places[end - 1]][1], columns):
         end -= 1

@@ -61,11 +61,8 @@ class TomlFile:
 def read_toml(path: Path, *, limit: int) -> TomlFile:
     """Read and parse a TOML file.
 
-    Raises
-    ------
-    InputError
-        ``file/...`` as in `read_bytes`, ``toml/encoding`` if it is not UTF-8, ``toml/syntax`` if it is no TOML or nests
-        deeper than ``DEEPEST``.
+    Raises `InputError` ``file/...`` as in `read_bytes`, ``toml/encoding`` if it is not UTF-8, ``toml/syntax`` if it is
+    no TOML or nests deeper than ``DEEPEST``.
     """
     data = read_bytes(path, limit=limit, setting="toml_max_bytes")
     try:
@@ -112,10 +109,7 @@ def nearest(name: str, known: Collection[str]) -> str | None:
 def checked_table(file: TomlFile, table: str, checks: Mapping[str, Check]) -> dict[str, Any]:
     """Values of one table, each through its check; keys that are not given are absent.
 
-    Raises
-    ------
-    InputError
-        ``toml/unknown-key``, ``toml/wrong-value``.
+    Raises `InputError` ``toml/unknown-key``, ``toml/wrong-value``.
     """
     values = file.tables.get(table, {})
     if not isinstance(values, dict):

@@ -28,6 +28,7 @@ do. A gap is written as in `str.format`; what may stand behind its colon:
 
 from __future__ import annotations
 
+import errno
 import string
 import tomllib
 import unicodedata
@@ -126,6 +127,13 @@ def entry(kind: str, name: str) -> Message:
 def word(name: str) -> Message:
     """A name used inside the program as one says it."""
     return entry("word", name)
+
+
+def by_system(error: OSError) -> Message:
+    """Why the operating system refused a file; in English alone where the catalogue does not have the reason."""
+    key = f"system.{errno.errorcode.get(error.errno or 0)}"
+    known = key in catalogue("en")
+    return Message(key) if known else free_text((error.strerror or str(error) or type(error).__name__).lower())
 
 
 def ended(outcome: Enum) -> Message:

@@ -8,9 +8,10 @@ import numpy as np
 
 from pipeline.report.page import band_width
 from pipeline.report.words import Words
-from pipeline.result import Result, leading, trusted
+from pipeline.result import Result, leading, set_aside, trusted
 from pipeline.result.answer import refusal
 from pipeline.result.headline import opening
+from pipeline.rounding import p_value
 from pipeline.settings import ReportSettings
 
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
@@ -94,11 +95,12 @@ def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str
 
 
 def pre_curvatures(result: Result) -> dict[str, tuple[float, float | None]]:
-    """K0 and its standard deviation, 1/m, by independent sources, then by the answer if it saw more than they."""
+    """K0 and its standard deviation, 1/m, by independent sources not set aside, then by the answer if it saw more."""
     found: dict[str, tuple[float, float | None]] = dict(result.agreement.pre_curvature) if result.agreement else {}
     for way, part in (("balance", result.balance), ("inverse", result.inverse)):
         if part is not None and part.pre_curvature_per_m is not None:
             found.setdefault(way, (part.pre_curvature_per_m, part.pre_curvature_std_per_m))
+    found = {way: value for way, value in found.items() if way not in set_aside(result)}
     curve = result.answer.curve
     if curve is not None and (curve.method == "extended" or (curve.method == "inverse" and "photo" in found)):
         found["extended" if curve.method == "extended" else "all"] = curve.pre_curvature, curve.pre_curvature_std
@@ -124,7 +126,8 @@ def _agreement(result: Result, words: Words) -> str:
     noise = np.hypot(np.interp(grid, one.kappa, one.tangent_std), np.interp(grid, two.kappa, two.tangent_std))
     expected = float(np.sqrt(np.mean((noise / mean) ** 2)))
     key = "agree_no" if not part.compatible else "agree_wide" if expected > WIDE else "agree_yes"
-    return words(key, rms=rms, expected=words.number(100.0 * expected, 2))
+    chance = p_value(part.p_value or 0.0, decimal=words.decimal)
+    return words(key, rms=rms, expected=words.number(100.0 * expected, 2), p=chance)
 
 
 def _advice(result: Result, words: Words) -> str:

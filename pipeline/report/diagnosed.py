@@ -16,8 +16,6 @@ from pipeline.settings import ReportSettings
 # A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
 SHARE_DIGITS = 2
 NOTHING = "–"
-# Columns of the table of causes that hold names.
-NAMES = 2
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ def diagnosis_view(
     if part is None or not result.answer.usable:
         return None
     following = part.next_experiment
-    heads, rows = _table(part, words)
+    heads, rows = [words(f"col_{key}") for key in COLUMNS], [_row(row, words) for row in ranking.ranked(part)]
     return DiagnosisView(
         unexplained=part.verdict == "unexplained",
         named=_named(part, words),
@@ -85,10 +83,7 @@ def _separates(experiment: NextExperiment, words: Words) -> str:
 
 
 def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
-    """One line a cause: name, probability, estimate, and what it cannot be told from; and what the catalogue says.
-
-    A cause that does not suffice may not be there at all: nobody is told to mend it.
-    """
+    """Name, probability, estimate and twins of a cause, and what to do; not of one that does not suffice."""
     named = []
     for cause in part.causes:
         estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)
@@ -121,14 +116,14 @@ def _twin(name: str, twin: TwinPart | None, words: Words) -> str:
     return words("other_name", name=words.cause(name), share=share, settled=words.settled(name))
 
 
-LEAST_SHARE = 1e-3
-"""Probability below which its size is not told: nothing hangs on it."""
+LEAST_SHARE, MOST_SHARE = 1e-3, 0.99
+"""Probabilities below and above which the size is not told: nothing hangs on it, and none is certain."""
 
 
 def _share(probability: float, words: Words) -> str:
     """A probability in per cent."""
-    shown = words.number(100.0 * max(probability, LEAST_SHARE), SHARE_DIGITS)
-    return shown if probability >= LEAST_SHARE else f"< {shown}"
+    shown = words.number(100.0 * min(max(probability, LEAST_SHARE), MOST_SHARE), SHARE_DIGITS)
+    return f"{'< ' if probability < LEAST_SHARE else '> ' if probability > MOST_SHARE else ''}{shown}"
 
 
 def _gain(part: DiagnosisPart, words: Words) -> list[str]:
@@ -148,12 +143,8 @@ def _gain(part: DiagnosisPart, words: Words) -> list[str]:
     ]
 
 
-def _table(part: DiagnosisPart, words: Words) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows of the table of causes: names, twins, then numbers; columns without any number are left out."""
-    keys = ("cause", "twin", "pull", "p", "estimate", "detectable", "survives", "heldout", "shift")
-    rows = [_row(row, words) for row in ranking.ranked(part)]
-    filled = [k for k in range(len(keys)) if k < NAMES or any(row[k] != NOTHING for row in rows)]
-    return [words(f"col_{keys[column]}") for column in filled], [[row[column] for column in filled] for row in rows]
+COLUMNS = ("cause", "twin", "pull", "p", "estimate", "detectable", "survives", "heldout", "shift")
+"""Of the table of causes: names, twins, then numbers."""
 
 
 def _row(row: CauseRow, words: Words) -> list[str]:
@@ -163,11 +154,12 @@ def _row(row: CauseRow, words: Words) -> list[str]:
         return NOTHING if value is None else words.number(100.0 * value, SHARE_DIGITS)
 
     seen, least = row.std > 0.0, row.minimal_detectable
+    chance = words("impossible_sign") if ranking.impossible(row) else words.probability(row.p_adjusted)
     return [
         words.cause(row.name),
         f"{words.cause(row.nearest_twin)} ({words.fixed(abs(row.twin_cosine), 2)})" if row.nearest_twin else NOTHING,
         words.fixed(row.z, 1) if seen else NOTHING,
-        words.probability(row.p_adjusted) if seen else NOTHING,
+        chance if seen else NOTHING,
         words.unit(row.unit, row.estimate, row.std).text(row.estimate, row.std) if seen else NOTHING,
         NOTHING if least is None else _range(least, row.detectable_in_any_form, row.unit, words),
         percent(row.surviving_fraction),

@@ -74,6 +74,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
                 "photos": photo_rows(result, words),
                 "knots": knot_rows(result, words),
             },
+            simulated=any(step.force_fit_N is not None for step in result.steps),
             knots_title=knot_title(result, words),
             force_symbol=force_unit(result, words).symbol,
             stiffness_symbol=stiffness_unit(result, words).symbol,

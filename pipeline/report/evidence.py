@@ -25,7 +25,7 @@ from pipeline.units import Unit, suited
 
 Size = tuple[float, float]
 TALL = (400.0, 350.0)
-POINTS = 5
+POINTS = 8  # of the characteristic in its table
 SENT = 5  # digits of numbers for the pointer: more than any band here supports, and a third of the bytes
 
 
@@ -223,7 +223,7 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
 def photos_note(result: Result, words: Words) -> str:
     """What the standard deviations in the table of photos leave out, because all photos share it."""
     scale = result.scale
-    if scale is None:
+    if scale is None or not any(photo.s_m for photo in result.photos):
         return ""
     common = [words("photos_scale", percent=words.number(100.0 * scale.std_relative, 2))]
     if scale.axis_parallax_std > 0.0:
@@ -232,18 +232,12 @@ def photos_note(result: Result, words: Words) -> str:
 
 
 def knot_rows(result: Result, words: Words) -> list[list[str]]:
-    """Rows of the table of the characteristic the report answers with: curvature, tangent.
-
-    The fitted law where that is the answer; any other way is read at `POINTS` places over the visited range.
-    """
+    """Rows of the table of the characteristic that answers: curvature, and tangent with the band of the answer."""
     unit, curve, exact = figures.stiffness_unit(result, words), result.answer.curve, words("exact")
     if curve is None:
         return []
-    if curve.method == "inverse" and result.inverse is not None:
-        points = [(k.kappa_per_m, (k.tangent_Nm2, k.std_Nm2)) for k in result.inverse.knots]
-    else:
-        points = [(float(k), curve.at(k)) for k in np.linspace(curve.kappa[0], curve.kappa[-1], POINTS)]
-    return [[f"{words.curvature(kappa)} ({exact})", unit.number(*tangent)] for kappa, tangent in points]
+    places = [float(kappa) for kappa in np.linspace(curve.kappa[0], curve.kappa[-1], POINTS)]
+    return [[f"{words.curvature(kappa)} ({exact})", unit.number(*curve.at(kappa))] for kappa in places]
 
 
 def knot_title(result: Result, words: Words) -> str:

@@ -105,9 +105,11 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
     radius = smallest_radius(result)
     if radius is not None:
         rows.append(("smallest_bend_radius_seen", radius[0], radius[1], "m", f"photo of step {radius[2]}"))
-    for cause in result.diagnosis.causes if result.diagnosis else []:
+    part = result.diagnosis
+    for cause in part.causes if part is not None and part.verdict != "unexplained" else []:
         apart = "are without it" if result.answer.method == "extended" else "contain what it does"
-        note = f"probability {cause.probability:.2g}; the numbers above {apart}"
+        share = "> 0.99" if cause.probability > 0.99 else f"{cause.probability:.2g}"
+        note = f"probability {share}; the numbers above {apart}"
         rows.append((cause.name, cause.estimate, cause.std, cause.unit.replace("^", ""), note))
     return pd.DataFrame(rows, columns=columns)
 

@@ -164,11 +164,7 @@ def _verdict(row: IndexRow) -> str:
 
 
 def _cells(row: IndexRow, unit: Unit, words: Words) -> list[object]:
-    """Texts of a row and the numbers it is sorted by, as the script of the page has them.
-
-    Name, report, type, state, verdict, four pairs of number and text, photos used and their text, troubles, the worst
-    of them and its language if it is another one, shapes, causes.
-    """
+    """Texts of a row and the numbers it is sorted by, in the order in which the script of the page takes them."""
     ends = [(None, None) if end is None else end[1:] for end in (row.low, row.high)]
     # both ways lack a cause that was found and is in the answer: how far they differ says nothing
     rms = None if row.rms_relative is None or row.method == "extended" else 100.0 * row.rms_relative

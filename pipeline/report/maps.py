@@ -1,4 +1,4 @@
-"""Maps of what is left: shape residuals over arc length and step, and cosines between causes.
+"""Maps: shape residuals over arc length and step, and cosines between causes.
 
 A residual map shows (measured - simulated) / standard deviation: rows are steps in the order of the test, columns are
 arc length from the left bearing axis. Purple and orange (map PuOr) are told apart in all colour blindnesses; white is

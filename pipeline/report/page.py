@@ -34,9 +34,9 @@ PALETTE = {
 }
 
 BETWEEN = re.compile(
-    r" (?=±)|(?<=±) |(?<=\d) (?=%|1/m|px|mm|µm|mN|N\b)|(?<=\bp) (?=[<=])|(?<=[<=]) (?=\d)|(?<=N) (?=m(?![a-z]))"
+    r" (?=±)|(?<=±) |(?<=\d) (?=%|1/m|px|mm|µm|mN|N\b)|(?<=\b[ps]) (?=[<=])|(?<=[<=]) (?=\d)|(?<=N) (?=m(?![a-z]))"
 )
-"""Spaces inside a quantity: a number, its standard deviation and unit, a p value, a product of units."""
+"""Spaces inside a quantity: a number, its standard deviation and unit, a p value, units multiplied, a place s."""
 
 
 def unbroken(value: Any) -> Any:

@@ -40,13 +40,7 @@ SMALL = 0.75
 
 
 class Sheet:
-    """A page that is filled from the top: texts, then parts for figures.
-
-    Parameters
-    ----------
-    title : str
-        Head of the page.
-    """
+    """A page that is filled from the top: its title, texts, then parts for figures."""
 
     def __init__(self, title: str) -> None:
         self.figure = Figure(figsize=(PAGE[0] / 72.0, PAGE[1] / 72.0), dpi=72, facecolor="white")

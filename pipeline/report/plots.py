@@ -54,10 +54,7 @@ def plot_residuals(result: Result, *, settings: ReportSettings | None = None) ->
 def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = None) -> Figure:
     """Draw the photo of a step with the centerline found on it; dashed where no photo shows the cable.
 
-    Raises
-    ------
-    ValueError
-        Where the result holds no picture of that step.
+    Raises `ValueError` where the result holds no picture of that step.
     """
     pictures = {one.step: (one, one.preview) for one in result.photos if one.preview is not None}
     if step not in pictures:

@@ -1,4 +1,4 @@
-"""Ranking of causes: how loud each is (pull) and how much it would change the answer (impact), one row a cause.
+"""Ranking of causes: how clearly each shows (pull) and how much it would change the answer (impact), one row a cause.
 
 Pull is the score z of the omitted cause, about N(0, 1) if it is absent. Impact is the relative shift of f_EI if the
 cause is put into the model. The two are unrelated, so both stand side by side, as in the rankings of particle
@@ -17,9 +17,18 @@ from pipeline.result import CauseRow, DiagnosisPart
 ROW_PX = 21.0
 
 
+def impossible(row: CauseRow) -> bool:
+    """Whether an estimate has a sign that its cause cannot have: loud, and yet p is 1."""
+    return row.p_adjusted >= 1.0 and abs(row.z) > NOISE
+
+
 def ranked(diagnosis: DiagnosisPart) -> list[CauseRow]:
-    """Causes by p value, then by pull; one whose estimate has a sign that it cannot have (p = 1) comes last."""
-    return sorted(diagnosis.table, key=lambda row: (row.p_adjusted, -abs(row.z)))
+    """Causes by p value, then by pull; those of an impossible sign last."""
+    return sorted(diagnosis.table, key=lambda row: (impossible(row), row.p_adjusted, -abs(row.z)))
+
+
+def _colour(row: CauseRow, named: set[str]) -> str:
+    return "alarm" if row.name in named else "grid" if impossible(row) else "muted"
 
 
 def ranking_height(diagnosis: DiagnosisPart) -> float:
@@ -36,7 +45,7 @@ def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words) -> Axes:
     middle = left + 0.5 * (width - left - 12.0)
     pull = plot_area(figure, left=left, right=width - middle + 6.0, top=8.0)
     impact = plot_area(figure, left=middle + 6.0, top=8.0)
-    colours = [LIGHT["alarm"] if row.name in named else LIGHT["muted"] for row in rows]
+    colours = [LIGHT[_colour(row, named)] for row in rows]
     places = range(len(rows))
     pull.axvspan(-NOISE, NOISE, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
     pull.barh(places, [row.z for row in rows], color=colours, height=0.62)

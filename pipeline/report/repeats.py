@@ -12,6 +12,7 @@ from itertools import groupby
 
 import numpy as np
 
+from pipeline.report.page import unbroken
 from pipeline.report.pooling import Pooled, Scatter, outlying, pool, scattered
 from pipeline.report.words import Words
 from pipeline.result import none_of_its_type
@@ -116,7 +117,7 @@ def _text(pooled: Pooled, scatters: dict[str, Scatter], names: list[str], words:
 
 def _cells(name: str, scatter: Scatter, unit: Unit, words: Words) -> tuple[str, ...]:
     """Column of the table."""
-    unit = replace(unit, decimal=words.decimal)
+    unit = replace(unit, decimal=words.decimal, symbol=unbroken(unit.symbol))
     p_value = words.probability(scatter.p_value)
     seen = unit.text(scatter.seen, scatter.seen_std) if scatter.seen > 0.0 else unit.plain(0.0)
     numbers = (unit.text(scatter.mean, scatter.mean_std), seen)

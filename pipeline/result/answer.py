@@ -118,10 +118,9 @@ def _best(result: Result) -> Visited | None:
 
 
 def leading(findings: Iterable[FindingPart]) -> FindingPart | None:
-    """The fault of the data that is told before every number; None without one: faulty data may fit very well.
+    """The fault of the data that is said before every number: an error, or a force of doubtful size; None without one.
 
-    An error, or a force of doubtful size: the scale of f_EI is nothing that fits or misfits. What a way to f_EI was
-    refused for stands where its numbers would be, and an error of the program is none of the data.
+    Why a way to f_EI was refused stands where its numbers would be, and an error of the program is none of the data.
     """
     faults = [f for f in findings if not f.code.startswith("identify/") and not f.code.endswith("/program-error")]
     first = (f for f in faults if f.level == "error")

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.errors import InputError
-from pipeline.messages import Message
+from pipeline.messages import Message, by_system
 from pipeline.result.diagnosed import CauseForm
 from pipeline.result.whole import SCHEMA, Result
 
@@ -44,10 +44,8 @@ def _set_without_number(form: CauseForm) -> CauseForm:
 def read_result(path: Path | str) -> Result:
     """Read ``result.json``, or the one in a folder.
 
-    Raises
-    ------
-    InputError
-        ``result/unreadable`` if it cannot be read or is none, ``result/version`` if another version wrote it.
+    Raises `InputError` ``result/unreadable`` if it cannot be read or is none, ``result/version`` if another version
+    wrote it.
     """
     file = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
     try:
@@ -68,10 +66,10 @@ def _other_version(error: Exception) -> str:
     return named if isinstance(named, str) and named.startswith(FAMILY) else ""
 
 
-def _told(error: Exception) -> str:
+def _told(error: Exception) -> str | Message:
     """What is wrong with a file, in a few words: of a file of another kind, or with a wrong value, where."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror.lower()
+    if isinstance(error, OSError):
+        return by_system(error)
     if not isinstance(error, ValidationError) or error.errors()[0]["type"] == "json_invalid":
         return str(error) if type(error) is ValueError else type(error).__name__
     first = error.errors(include_url=False, include_input=False)[0]

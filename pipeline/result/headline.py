@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from pipeline.messages import Message
 from pipeline.result.answer import leading, refusal
 from pipeline.result.visited import Visited
@@ -16,7 +14,7 @@ from pipeline.result.whole import Result
 
 
 def opening(result: Result) -> Message:
-    """f_EI at both ends of the visited range and K0, after a fault of the data; or why there is none to be used."""
+    """f_EI at both ends of what the data determine and K0, after a fault; or why there is none to be used."""
     name, answer = result.specimen.id, result.answer
     if answer.curve is None:
         return _unmeasured(result)
@@ -53,13 +51,9 @@ def _unmeasured(result: Result) -> Message:
 
 
 def _range(name: str, curve: Visited) -> Message:
-    known = np.flatnonzero(curve.tangent_std < curve.tangent)
-    if not known.size:
+    if not curve.known:
         return Message("opening.unknown", id=name)
-    # an end where f_EI is known no better than to itself says nothing
-    (low, high), (first, last), (first_std, last_std) = (
-        values[known[[0, -1]]].tolist() for values in (curve.kappa, curve.tangent, curve.tangent_std)
-    )
+    (low, first, first_std), (high, last, last_std) = curve.ends()
     # a law is positive and its errors are relative ones: 1.3 +- 0.8 is far from 0.035 +- 0.002
     beyond = abs(math.log(last / first)) > 2.0 * math.hypot(first_std / first, last_std / last)
     return Message(

@@ -24,10 +24,7 @@ Floats = list[Number]
 def check_one_length(part: BaseModel, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> None:
     """Refuse lists of a part that differ in length; optional ones may be empty.
 
-    Raises
-    ------
-    ValueError
-        With the lengths.
+    Raises `ValueError` with the lengths.
     """
     lengths = {name: len(getattr(part, name)) for name in (*needed, *optional)}
     if len({lengths[name] for name in lengths if name in needed or lengths[name]}) > 1:
@@ -127,7 +124,9 @@ class PhotoPart(SaidPart):
     seen: list[bool] = Field([], description="false where the cable was hidden and its centerline was continued")
     kappa_fit_per_m: Floats = Field([], description="curvature of the fitted simulation at s_m, 1/m")
     shape_residual_m: Floats = Field([], description="measured minus simulated position along the normal at s_m, m")
-    shape_residual_std_m: Floats = Field([], description="its standard deviation, m: photo noise, correlated")
+    shape_residual_std_m: Floats = Field(
+        [], description="its standard deviation, m: photo noise, correlated; axes apart"
+    )
     preview: PreviewPart | None = Field(None, description="reduced picture, sizes in px; null if it cannot be read")
 
     @model_validator(mode="after")

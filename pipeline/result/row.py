@@ -28,7 +28,7 @@ Text = Annotated[str, AfterValidator(lambda text: text.encode("utf-8", "replace"
 Told = Annotated[Message | None, PlainValidator(lambda said: said if said is None else Message.read(said))]
 STATUSES = ("measured", "partial", "failed")
 
-ROW = 4
+ROW = 5
 """Version of what stands in an entry; another one is made anew from the result."""
 
 SHAPES, SHAPE_POINTS = 5, 11
@@ -69,7 +69,7 @@ class IndexRow:
     method : str
         Which curve answers; empty without any.
     low, high : (kappa, f_EI, std) or None
-        Ends of the visited range, 1/m and N m^2.
+        Ends of the range that the data determine, 1/m and N m^2.
     pre_curvature : (K0, std) or None
         1/m.
     rms_relative, compatible : float, bool or None
@@ -202,13 +202,7 @@ def as_entry(row: IndexRow) -> dict[str, Any]:
 
 
 def from_entry(data: object) -> IndexRow:
-    """The row of an entry.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or one of another version.
-    """
+    """The row of an entry; raises `ValueError` if it is none, or one of another version."""
     if not isinstance(data, dict) or data.get("version") != ROW:
         raise ValueError("no row of this version")
     try:

@@ -58,9 +58,19 @@ class Visited:
             float(np.interp(kappa, self.kappa, self.tangent_std)),
         )
 
+    @property
+    def known(self) -> bool:
+        """Whether f_EI is known to better than itself anywhere."""
+        return bool(np.any(self.tangent_std < self.tangent))
+
     def ends(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Curvature, tangent and its standard deviation at both ends; 1/m and N m^2."""
-        first, last = ((float(self.kappa[i]), float(self.tangent[i]), float(self.tangent_std[i])) for i in (0, -1))
+        """Curvature, tangent and its standard deviation (1/m, N m^2) at both ends of the range that the data determine.
+
+        Where little of the cable was bent so far, the band runs away (`FAR`), and f_EI there is no figure to quote.
+        """
+        band = self.tangent_std / np.abs(self.tangent)
+        held = np.flatnonzero(band <= FAR * np.median(band))[[0, -1]]
+        first, last = ((float(self.kappa[i]), float(self.tangent[i]), float(self.tangent_std[i])) for i in held)
         return first, last
 
     def told(self) -> tuple[tuple[str, str], ...]:
@@ -71,6 +81,10 @@ class Visited:
     def _repr_html_(self) -> str:
         """Show the curve in a notebook."""
         return html_table(self.method, self.told())
+
+
+FAR = 3.0
+"""Times its median: a relative band wider than that is not determined by the data but by its neighbours."""
 
 
 def html_table(caption: str, rows: Iterable[tuple[str, str]]) -> str:

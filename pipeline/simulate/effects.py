@@ -87,13 +87,7 @@ class Effect(NamedTuple):
 
 
 def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
-    """Setup with all effects in it.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown or the number of values is wrong.
-    """
+    """Setup with all effects in it; raises `ValueError` if a name is unknown or the number of values is wrong."""
     for name, given in effects.items():
         effect = _effect(name)
         values = tuple(float(v) for v in np.atleast_1d(given))
@@ -107,10 +101,7 @@ def hide(setup: Setup, effects: Mapping[str, float | Values]) -> Setup:
 def parse_effect(text: str) -> tuple[str, Values]:
     """Read ``NAME=VALUE`` or ``NAME=VALUE,VALUE``.
 
-    Raises
-    ------
-    ValueError
-        If it cannot be read, or no such value can be; the message names the nearest known name.
+    Raises `ValueError` if it cannot be read, or no such value can be; the message names the nearest known name.
     """
     given, _, rest = text.partition("=")
     name = given.strip()
@@ -133,11 +124,8 @@ def parse_effect(text: str) -> tuple[str, Values]:
 def check_geometry(length: float, pre_curvature: float, effects: Mapping[str, float | Values]) -> None:
     """Refuse what does not fit a cable of this length.
 
-    Raises
-    ------
-    ValueError
-        With the figures: a cable rolled up to more than a half circle at rest has no chord to be pushed along, and
-        stiff ends of more than a quarter of the length each leave less cable than clamp.
+    Raises `ValueError` with the figures: a cable rolled up to more than a half circle at rest has no chord to be pushed
+    along, and stiff ends of more than a quarter of the length each leave less cable than clamp.
     """
     K0 = float(np.atleast_1d(effects.get("pre_curvature", pre_curvature))[0])
     if not abs(K0) * length < np.pi:

@@ -136,10 +136,7 @@ def protocol(name: ProtocolName, steps: int, step_m: float) -> tuple[float, ...]
 def bend(experiment: Experiment) -> tuple[State, ...]:
     """Bend the cable through all steps with the discrete rod.
 
-    Raises
-    ------
-    ValueError
-        If a step has no equilibrium, with the solver's advice.
+    Raises `ValueError` if a step has no equilibrium, with the solver's advice.
     """
     test = experiment.setup(Camera()).test
     states = []

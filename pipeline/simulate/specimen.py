@@ -139,10 +139,7 @@ def write_specimen(
 def _lean(setup: Setup, states: tuple[State, ...]) -> float:
     """Sine of the angle by which the plane of the cable is turned about the chord.
 
-    Raises
-    ------
-    ValueError
-        If the bow cannot stand so high.
+    Raises `ValueError` if the bow cannot stand so high.
     """
     bow = max(float(np.max(np.abs(state.y))) for state in states)
     if not setup.bow < bow:

@@ -129,10 +129,7 @@ def balance(test: MeasuredTest) -> BalanceGraph:
 
 
 def _regress_in_spite_of_misfit(model: MomentModel, start: float) -> Regression | None:
-    """Regression that counts as noise, too, what photos and forces leave beside one curve.
-
-    4 per degree of freedom is far above what noise alone does with more than a hundred of them.
-    """
+    """Regression that counts as noise what photos and forces leave beside one curve, where that is far above noise."""
     for _ in range(8):
         found = regress(model, pre_curvature=start)
         misfit = CONTRADICTION

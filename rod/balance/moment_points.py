@@ -311,10 +311,7 @@ def pointwise_graph(step: MeasuredStep) -> tuple[Array, Array]:
 
     Kept for comparison. It is 0/0 at mid-span, where it is NaN, and biased wherever the photo is noisy.
 
-    Raises
-    ------
-    ValueError
-        If the step has no photo.
+    Raises `ValueError` if the step has no photo.
     """
     shape = step.shape
     if shape is None:

@@ -34,7 +34,7 @@ ITERATIONS = 25
 
 @dataclass(frozen=True)
 class Regression:
-    """A settled regression.
+    """A converged regression.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def bow_terms(data: MomentPoints) -> Array:
 
 
 def regress(model: MomentModel, *, pre_curvature: float) -> Regression | None:
-    """Fit by Gauss-Newton from a straight line of compliance; None if it does not settle."""
+    """Fit by Gauss-Newton from a straight line of compliance; None if it does not converge."""
     unknowns = np.concatenate([np.zeros(model.size), [pre_curvature], np.zeros(len(model.common_std) + BOW_TERMS)])
     found = _settled(model, unknowns, smooth=False)
     for laid in range(LAYINGS):

@@ -231,10 +231,7 @@ def start(
     K0, with ``side`` (1/m) the law that photos show beside that K0. A displacement that is known to ``exact`` (m) or
     better has no error of its own.
 
-    Raises
-    ------
-    ValueError
-        If no step has both a photo and a force.
+    Raises `ValueError` if no step has both a photo and a force.
     """
     K, m = measured_curvatures(test)
     slope, rest = np.polyfit(m, K, 1) if np.ptp(m) > 0.0 else (0.0, float(np.mean(K)))
@@ -272,7 +269,7 @@ def start(
 
 
 def bent_at_rest(test: MeasuredTest) -> float | None:
-    """Size of K0, 1/m, by how far apart the axes stood at rest; None where nobody tells."""
+    """Size of K0, 1/m, by how far apart the axes stood at rest; None where no photo or log tells it."""
     chords = [step.chord for step in test.steps if step.branch == "mounted" and step.chord is not None]
     logged = [(step.chord, step.displacement) for step in test.steps]
     chords = chords or [chord + moved for chord, moved in logged if chord is not None and moved is not None]
@@ -296,10 +293,7 @@ def _first_error(test: MeasuredTest, facts: Facts, index: int, pre_curvature: fl
 def measured_curvatures(test: MeasuredTest) -> tuple[Array, Array]:
     """Curvature (n,) 1/m and moment P y (n,) N m wherever photos show the cable, but for their outermost tenths.
 
-    Raises
-    ------
-    ValueError
-        If no step has both a photo and a force.
+    Raises `ValueError` if no step has both a photo and a force.
     """
     curvature, moment = [], []
     for step in test.steps:

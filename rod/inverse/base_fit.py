@@ -115,7 +115,7 @@ def _rest(fitted: Fit) -> float:
 
 
 def _apart(one: Fit, other: Fit) -> bool:
-    """Whether a fit lies in another valley: its K0 more than a standard deviation away, or its chi-square lower."""
+    """Whether a fit lies in another minimum: its K0 more than a standard deviation away, or its chi-square lower."""
     at = other.extension.base.pre_curvature_index
     assert at is not None  # only a photo at rest holds it
     return bool((_rest(one) - _rest(other)) ** 2 > other.covariance[at, at] or one.chi2 < other.chi2 - 1.0)
@@ -130,10 +130,9 @@ PAYS, ATTEMPTS = 16.0, 3
 
 
 def settled(observation: Observation, fitted: Fit) -> Fit:
-    """A fit gone on with where it ran out of steps, or where its law is pulled by what is known of its form.
+    """Continue a fit that ran out of steps, or whose law is pulled by the prior of its form.
 
-    The abscissa lies along the law that a fit began with, and the law found may bend elsewhere: a knee that none was
-    there is pulled to a smooth law by 10 sigma. A K0 of the other side, or a cause, then looks likelier than it is.
+    The abscissa lies along the law that a fit began with, and the law found may have a knee where that one had none.
     """
     for _ in range(ATTEMPTS):
         if fitted.run.prediction is None or (fitted.converged and not _law_is_pulled(fitted)):
@@ -156,7 +155,7 @@ def _law_is_pulled(fitted: Fit) -> bool:
 
 
 def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:
-    """The model with the abscissa of its law laid along the law found, over what was visited, and its vector there."""
+    """The model with the abscissa of its law spread along the law found, on the visited range, and its vector there."""
     base, count = fitted.extension.base, fitted.extension.base.law.size
     assert isinstance(base.law, AnyLaw)
     law, visited = law_of(fitted), np.append(fitted.excess, 0.0)

@@ -7,6 +7,7 @@ cause, such as the place of a soft spot or a relaxation time. ``amount = 0`` lea
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -146,12 +147,16 @@ class Cause(ABC):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """The model with the cause in it."""
 
+    def together(self, forms: Sequence[Variant], facts: Facts) -> tuple[str, Array] | None:
+        """Unit and rows (m, k), per unit of the amounts of k forms, of what these make up; the largest is the size.
+
+        None where an amount says the size.
+        """
+        return None
+
     def along_cable(self, variant: Variant, model: Model) -> tuple[str, Array]:
         """Parameter of `rod.parameters` that the amount of a form moves, and the basis (n joints,) along which.
 
-        Raises
-        ------
-        NotImplementedError
-            If the cause does not vary along the cable.
+        Raises `NotImplementedError` if the cause does not vary along the cable.
         """
         raise NotImplementedError(self.name)

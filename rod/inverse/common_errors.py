@@ -53,7 +53,7 @@ class CommonErrors:
 
 
 def common_errors(sections: Sequence[Midline], whiten: Sequence[Array]) -> CommonErrors | None:
-    """What the photos of a test err alike; None where nothing is told of it.
+    """Errors that the photos of a test share; None where none are stated.
 
     Parameters
     ----------

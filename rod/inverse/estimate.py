@@ -222,7 +222,7 @@ CONTRADICTS = 16.0
 
 
 def _without(found: BaseFit, step: int) -> float:
-    """Chi-square that goes, to first order, with the chord of a step, by its index."""
+    """Chi-square saved, to first order, by leaving out the chord of a step, by the step's index."""
     rows, fitted = found.observation.rows, found.fitted
     row = int(np.flatnonzero((rows.kind == KINDS.index("chord")) & (rows.step == step))[0])
     known = float(fitted.jacobian[row] @ fitted.covariance @ fitted.jacobian[row])

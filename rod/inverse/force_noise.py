@@ -1,4 +1,4 @@
-"""What the load cell scatters: the noise level of a force sample, from the samples within the holds.
+"""Noise level of a force sample, from the samples within the holds.
 
 ``samples of a hold about their own smooth course -> one level, or a level for each hold -> how well it is known``
 

@@ -1,4 +1,4 @@
-"""How a fitted law answers to every source of error, and what it is without the force-free photo.
+"""How a fitted law responds to every source of error, and what it is without the force-free photo.
 
 To first order the law moves by ``response J^T W dr`` where the whitened residual changes by dr, and by
 ``-response L d`` where a nuisance is off by d that its prior, of precision L, takes for zero. Sources are named as
@@ -51,7 +51,7 @@ def gains(test: MeasuredTest, observation: Observation, fitted: Fit, response: A
 
 
 def _nuisances(test: MeasuredTest, fitted: Fit) -> dict[Source, Array]:
-    """What one standard deviation of each common error is of the vector, (p,)."""
+    """Changes (p,) of the vector by one standard deviation of each common error."""
     base = fitted.extension.base
     unit = dict(zip(base.names, np.eye(fitted.extension.size), strict=False))
     found: dict[Source, Array] = {("scale", -1): base.scale_std * unit["scale"]}

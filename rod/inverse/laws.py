@@ -98,7 +98,7 @@ class AnyLaw:
         return np.eye(self.size)
 
     def stiffer(self, factor: float) -> Array:
-        """B-splines of equal coefficients are a constant."""
+        """All coefficients alike: B-splines of equal coefficients are a constant."""
         return np.full(self.size, np.log(factor) if self.over == "bend" else -np.log(factor))
 
     def prior(self) -> Array:
@@ -115,7 +115,7 @@ class AnyLaw:
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """All of `rod.law_prior`."""
+        """All families of `rod.law_prior`."""
         return priors(self.basis)
 
     def softening(self, unknowns: Array) -> tuple[float, Array]:
@@ -151,21 +151,21 @@ class FewPoints:
         return np.diag(self.stiffness * np.exp(unknowns))
 
     def stiffer(self, factor: float) -> Array:
-        """All ordinates."""
+        """All ordinates alike."""
         return np.full(self.size, np.log(factor))
 
     def prior(self) -> Array:
-        """Nothing."""
+        """No rows: few points need no prior."""
         return np.zeros((0, self.size))
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """Nothing either."""
+        """One family that knows nothing."""
         none = np.zeros((self.size, self.size))
         return (Family(none, none, np.zeros(len(TAUS))),)
 
     def softening(self, unknowns: Array) -> tuple[float, Array]:
-        """Nothing."""
+        """Nothing is known of it."""
         return 0.0, np.zeros(self.size)
 
 

@@ -128,7 +128,7 @@ def rows_posterior(fitted: Fit, value: Array, J: Array, *, held: NDArray[np.bool
 
 
 def linearised(observation: Observation, fitted: Fit, beside: Array) -> tuple[Array, Array]:
-    """Residual (n,) and its derivative: data, each kind as heavy as it fits, and all that is known but of the law."""
+    """Residual (n,) and its derivative: data by their `weights`, and all prior knowledge but that of the law."""
     base, facts = fitted.extension.base, fitted.extension.facts
     count, weight = observation.rows.count, weights(observation, fitted)
     known = count + base.known
@@ -147,10 +147,9 @@ def linearised(observation: Observation, fitted: Fit, beside: Array) -> tuple[Ar
 
 
 def weights(observation: Observation, fitted: Fit) -> Array:
-    """Of the data (N,): each kind as heavy as it fits.
+    """Weights (N,) of the data: a kind (forces, photos) that fits badly counts for less.
 
-    Photos fit as badly as they pull lengths, scale and axes away from what is known of these: a cable said to be 15 %
-    too short was fitted to the noise with a scale that was off by 485 standard deviations.
+    Photos fit as badly as they pull lengths, scale and axes away from what is known of these.
     """
     count, known = observation.rows.count, fitted.extension.base.known
     pulled = max(float(np.sum(fitted.residual[count : count + known] ** 2)) - known, 0.0)

@@ -1,4 +1,4 @@
-"""What photos scatter beyond what they state; that of the forces is in `force_noise`.
+"""Noise of the photos, also beyond what they state; that of the forces is in `force_noise`.
 
 In: block means of the midline of each photo (`rod.midline`). Out: their covariance with the level and the correlation
 length that they show. The residuals of a fit never set a variance here: only the part of a photo's scatter that no bent

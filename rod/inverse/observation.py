@@ -154,11 +154,11 @@ class Observation:
     common: CommonErrors | None = None
 
     def joined(self, values: Array) -> Array:
-        """Values (N, ...) of rows whitened photo by photo, with what all photos err alike."""
+        """Rows (N, ...) whitened photo by photo -> whitened with the errors that photos share."""
         return values if self.common is None else self._with_photos(values, self.common.whitened)
 
     def separated(self, values: Array) -> Array:
-        """The inverse of `joined`: how each photo by itself sees values (N, ...) of the rows."""
+        """The inverse of `joined`: rows (N, ...) whitened photo by photo."""
         return values if self.common is None else self._with_photos(values, self.common.undone)
 
     def _with_photos(self, values: Array, change: Callable[[Array], Array]) -> Array:

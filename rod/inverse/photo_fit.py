@@ -48,8 +48,20 @@ def photo_fit(observation: Observation, fitted: Fit, photo: PhotoData, of: Midli
     return PhotoFit(distance - by_axes(of, photo.chord)[1:] @ _axis_errors(observation, fitted, photo), kappa)
 
 
+def distance_std(photo: PhotoData, shape: MeasuredShape) -> Array:
+    """Standard deviation (n,) m of `photo_fit`'s distance to the smooth curve of a photo, errors of its axes apart."""
+    sections = np.column_stack([np.interp(photo.sections.s, shape.s, column) for column in shape.basis_normal.T])
+    taken = by_axes(shape, photo.chord)[1:] @ _likeliest(photo) @ photo.whiten[:, 1:]
+    left = shape.basis_normal - taken @ sections
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ip,pq,iq->i", left, shape.covariance, left), 0.0)))
+
+
 def _axis_errors(observation: Observation, fitted: Fit, photo: PhotoData) -> Array:
     """The likeliest errors (4,) m of the axes of a photo, in the order of `by_axes`."""
     own = observation.separated(fitted.residual[: observation.rows.count])[observation.rows.of_photo(photo.step)]
-    seen = photo.whiten @ by_axes(photo.sections, photo.chord)
-    return np.asarray(0.5 * photo.stated_chord_std**2 * seen.T @ own)
+    return np.asarray(_likeliest(photo) @ own)
+
+
+def _likeliest(photo: PhotoData) -> Array:
+    """What takes whitened rows of a photo to the likeliest errors of its axes: (4, rows) m."""
+    return np.asarray(0.5 * photo.stated_chord_std**2 * (photo.whiten @ by_axes(photo.sections, photo.chord)).T)

@@ -37,7 +37,7 @@ class Bounds(NamedTuple):
     least: Array
 
     def joined(self, other: Bounds) -> Bounds:
-        """Both."""
+        """The rows of both."""
         return Bounds(np.vstack([self.rows, other.rows]), np.r_[self.least, other.least])
 
 

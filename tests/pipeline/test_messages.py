@@ -1,7 +1,9 @@
 """Messages are data: both catalogues say the same things, everything made finds its sentence, and survives JSON."""
 
 import ast
+import errno
 import json
+import os
 import re
 import string
 from pathlib import Path
@@ -9,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.messages import Message, catalogue, free_text
+from pipeline.messages import Message, by_system, catalogue, free_text
 from pipeline.report.words import Words
 from pipeline.result import FindingPart
 
@@ -36,6 +38,7 @@ MADE = (
     "plan.",
     "effect.",
     "paper.",
+    "system.",
 )
 
 
@@ -74,6 +77,15 @@ def test_numbers_are_those_of_the_language():
         "the load cell reads 12.3 ± 0.4\u00a0mN in the force-free step 0, 30.8 standard deviations from zero"
     )
     assert message.said("de").startswith("die Kraftmessdose zeigt 12,3 ± 0,4\u00a0mN im kraftfreien Schritt 0, 30,8 ")
+
+
+def test_reasons_of_the_operating_system_are_said_in_the_language():
+    for name in (key.removeprefix("system.") for key in catalogue("en") if key.startswith("system.")):
+        number = getattr(errno, name)
+        refused = by_system(OSError(number, os.strerror(number)))
+        assert refused.said("en") == os.strerror(number).lower() != refused.said("de")
+    unknown = by_system(OSError(errno.EXDEV, os.strerror(errno.EXDEV)))
+    assert unknown.english and unknown.said("de") == os.strerror(errno.EXDEV).lower()
 
 
 def test_what_is_quoted_from_a_file_stays_as_it_is():

@@ -47,7 +47,7 @@ class OutOfPlaneBow(Cause):
         return facts.moment_scale / facts.force_scale / 6.0
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """With the height (0) or the lean (1, ``at``) of all photos alike, under a camera far off or near (``width``).
+        """The same height in all photos (``at`` 0) or the same lean (1), seen by a far or a near camera (``width``).
 
         ``width`` is the length over the distance of the camera, negative where the bow leads away from it; 0 from afar,
         where nothing but the height shrinks the bow: a near camera tells of their product first.

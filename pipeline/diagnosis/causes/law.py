@@ -41,7 +41,7 @@ class NonlinearStiffness(Cause):
         return 0.05 * facts.moment_scale / facts.curvature_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """None beside a law of any form; see `pipeline.diagnosis.rediscovery`."""
+        """No form: the base model's law may have any shape already; see `pipeline.diagnosis.rediscovery`."""
         return ()
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
@@ -69,10 +69,9 @@ class Hysteresis(Cause):
         return 0.1 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Friction that slips after some share of the range of curvatures, all at once or giving way gradually.
+        """Friction that slips after some share of the range of curvatures, at once or gradually.
 
-        Loops that follow Masing's rule are a sum of the first, Dahl's and those near it of the second. On loading alone
-        they are part of the law.
+        Sums of the first are loops by Masing's rule, of the second Dahl's. On loading alone both are part of the law.
         """
         # what has not slipped over the whole range is elastic, and no other than the law itself; of what gives way
         # gradually a seventh still sticks once the curvature has changed by twice as much as it decays over
@@ -119,11 +118,10 @@ class PlasticSet(Cause):
         return 0.05
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Where the cable bends, the law moving along with the new rest or not; or all along with the largest bend.
+        """A set at each point by its own bend, the law moving along or not; or of the whole cable by its largest bend.
 
-        From the first bend on, or beyond ``width``, sought from a low one and from a high one: with every step that a
-        threshold passes the misfit has another valley. What saturates may have a threshold too. On loading alone a set
-        where the cable bends is part of the law.
+        From the first bend on, or beyond a threshold ``width``, sought from a low and a high one: the misfit has a
+        minimum between any two steps. On loading alone a set at each point is part of the law.
         """
         reach = 0.9 * facts.curvature_scale
         plain = Variant(at_range=(0.0, MOST_SATURATED / reach), width_range=(0.0, reach))
@@ -165,7 +163,7 @@ class StiffnessDrift(Cause):
         return 0.05 / max(len(facts.branch) - 1, 1)
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Steady, settling (``width`` above 0) or speeding up; from step to step, or in the holds (``at`` 1) too."""
+        """A steady, settling (``width`` above 0) or accelerating change, from step to step or in holds (``at`` 1)."""
         form = replace(SETTLING, label="from step to step")
         if len(facts.branch) < 3:
             return ()

@@ -13,7 +13,7 @@ Relaxation belongs to the cable, but as it scales moments everywhere alike it ch
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 def shown(reading: Callable[[Array, Array, float], Array]) -> Observer:
-    """Observer whose load cell shows ``reading(force, time in the hold, time of the hold's begin)``."""
+    """Observer whose load cell shows ``reading(force, time in the hold, time at which the hold began)``."""
 
     def observer(prediction: Prediction, facts: Facts) -> Prediction:
         samples = tuple(
@@ -46,7 +46,7 @@ SETTLING = Variant(tuned=("width",), width_range=(-4.0, 4.0))
 
 
 def passed(share: Array, settling: float) -> Array:
-    """Share of a drift that has come after a share of the test: steadily, or like 1 - exp(-settling share)."""
+    """Share of the whole drift reached after a share of the test: in proportion, or like 1 - exp(-settling share)."""
     if abs(settling) < 1e-6:
         return share
     return np.asarray(np.expm1(-settling * share) / np.expm1(-settling))
@@ -102,9 +102,9 @@ class ForceDrift(Cause):
         return (SETTLING,) if facts.timed else ()
 
     def by_step(self, amount: float, facts: Facts) -> tuple[tuple[Variant, ...], ...]:
-        """Rates of a random walk, after the test as far from zero as the steady drift: in each hold, and between them.
+        """A zero that wanders: a rate for each hold and for each time between, a random walk as large as the drift.
 
-        Between two holds the rate is the mean of theirs, and another one by a part of what it may be.
+        Between two holds the rate is the mean of theirs, give or take a part of the plausible rate.
         """
         if not (facts.timed and np.max(facts.clock) > 0.0):
             return ()
@@ -130,6 +130,19 @@ class ForceDrift(Cause):
 
         return model.observed(shown(reading))
 
+    def together(self, forms: Sequence[Variant], facts: Facts) -> tuple[str, Array] | None:
+        """How far a zero that wanders has gone, N, when holds begin and end."""
+        if all(form.label != WANDERING for form in forms):
+            return None
+        span, parts = float(np.max(facts.clock)) or 1.0, np.eye(2 * facts.clock.size - 1)
+        rows = [
+            _path(parts[int(form.at)], facts)
+            if form.label == WANDERING
+            else span * passed(_moments(facts) / span, form.width)
+            for form in forms
+        ]
+        return "N", np.column_stack(rows)
+
 
 WANDERING, BETWEEN = "wandering", 0.3
 """Label of a drift whose rate changes, and how far (share of the rates, standard deviation) it changes unseen: what
@@ -138,18 +151,23 @@ stands still in the holds and jumps between them is no drift."""
 
 @dataclass(frozen=True, eq=False)
 class _Wandering:
-    """Observer whose zero wanders about a mean rate: ``rates`` (2 n - 1,) N/s of n holds and, between, beside them."""
+    """Observer whose zero wanders: ``rates`` (2 n - 1,) N/s in n holds and in the times between, beside a mean rate."""
 
     rates: Array
 
     def __call__(self, prediction: Prediction, facts: Facts) -> Prediction:
-        moments, span = _moments(facts), float(np.max(facts.clock)) or 1.0
-        rates = self.rates.copy()
-        rates[1::2] += 0.5 * (rates[:-1:2] + rates[2::2])
-        path = np.append(0.0, np.cumsum(rates * np.diff(moments)))
-        path -= moments / span * np.interp(span, moments, path)
+        moments, path = _moments(facts), _path(self.rates, facts)
         zero = shown(lambda force, time, begin: np.asarray(force + np.interp(begin + time, moments, path)))
         return zero(prediction, facts)
+
+
+def _path(rates: Array, facts: Facts) -> Array:
+    """Where a zero that wanders is at `_moments`, N, beside its mean rate."""
+    moments, span = _moments(facts), float(np.max(facts.clock)) or 1.0
+    rates = rates.copy()
+    rates[1::2] += 0.5 * (rates[:-1:2] + rates[2::2])
+    path = np.append(0.0, np.cumsum(rates * np.diff(moments)))
+    return np.asarray(path - moments / span * np.interp(span, moments, path))
 
 
 def _moments(facts: Facts) -> Array:
@@ -163,7 +181,7 @@ SLOWLY = "by as much in every tenfold of the time"
 
 
 def lost_unseen(fitted_amount: float, variant: Variant, facts: Facts) -> float:
-    """Share of a force that relaxation takes in one interval of the log: so long a hold may have lasted unseen."""
+    """Share of a force that relaxation takes in one interval of the log: a hold may have begun that much earlier."""
     intervals = np.concatenate([np.diff(times) for times in facts.hold_times])
     return float(_lost(fitted_amount, variant, facts, np.median(intervals)))
 
@@ -192,11 +210,10 @@ class Relaxation(Cause):
         return 0.05
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Relaxation times from a tenth of a hold to three holds; each hold by itself, or all with a memory of others.
+        """Relaxation times from a tenth of a hold to three holds, each hold by itself or with a memory of earlier ones.
 
-        What a cable has lost in one hold it does not win back in the next: a bow that grows by little loses little.
-        A cable of several materials has several times: its relaxation is a sum of forms.
-        A log without times is taken as sampled evenly from its first row to its last.
+        A cable of several materials has several times: its relaxation is a sum of forms. A log without times is taken
+        as sampled evenly.
         """
         span = max((float(np.ptp(times)) for times in facts.hold_times), default=0.0)
         if span <= 0.0:

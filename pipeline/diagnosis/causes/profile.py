@@ -64,9 +64,9 @@ def forms() -> tuple[Variant, ...]:
 
 
 def step() -> Variant:
-    """Two pieces of different kind with a seam between: half a cable that was wound otherwise, a spliced one.
+    """Two pieces of different kind with a seam between: a splice, or half a cable that was wound otherwise.
 
-    Like a wave it is tried once the cause is known. A seam narrower than an element (1/120) shows no other trace.
+    Tried once the cause is known, like a wave. A seam narrower than an element (1/120) looks like one as wide.
     """
     return Variant(
         SEAM,
@@ -84,9 +84,9 @@ def piece() -> Variant:
 
 
 def wave(half_periods: int) -> Variant:
-    """One of the waves any profile is a sum of; ``at`` is minus its number of half periods.
+    """Cosine wave of a profile, one of many that add up; ``at`` is minus its number of half periods.
 
-    Those of a step fall with their number, and no profile has more of short waves; see `STEEPEST`.
+    Plausible amounts fall with that number as they do for a step; see `STEEPEST`.
     """
     return Variant("in waves", at=-float(half_periods), known=STEEPEST / half_periods)
 
@@ -160,7 +160,7 @@ def _places(kind: Variant) -> Iterator[Variant]:
 
 
 def deviation(uniform: Model, varying: Model, cause: Cause) -> Array:
-    """How far (n joints,) a cause of this module takes a cable from another: K0, 1/m, or relative EI."""
+    """Change (n joints,) of K0 (1/m) or of EI (relative) by a cause of this module."""
     before, after = uniform.bending.rod.section, varying.bending.rod.section
     if isinstance(cause, PreCurvatureVarying):
         return np.asarray(after.pre_curvature - before.pre_curvature)
@@ -174,17 +174,22 @@ def _factor(model: Model) -> Array:
 
 
 def largest_of(forms: Sequence[Variant], amounts: Array, covariance: Array, cause: Cause) -> Array:
-    """The forms (k,) of a cause of this module where their sum deviates most: its size is this times their amounts.
-
-    Most is what lies beyond two standard deviations: where no photo shows the cable, under a cover, waves may run far
-    and mean nothing (a profile that no chance explains was told as 0.3 +- 0.4 1/m). ``covariance`` (k, k) is that of
-    the amounts.
-    """
+    """The forms (k,) of a cause where their sum deviates most: the size of the cause is this times their amounts."""
     position, beside = np.linspace(0.0, 1.0, 401), isinstance(cause, StiffnessVarying)
-    table = np.column_stack([profile(form, position, from_beside=beside) for form in forms])
-    size = np.abs(table @ amounts)
-    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", table, covariance, table), 0.0))
-    return np.asarray(table[int(np.argmax(size - 2.0 * std))])
+    return largest(
+        np.column_stack([profile(form, position, from_beside=beside) for form in forms]), amounts, covariance
+    )
+
+
+def largest(rows: Array, amounts: Array, covariance: Array) -> Array:
+    """Row (k,) of ``rows`` (m, k) whose product with amounts of that covariance (k, k) is largest.
+
+    Largest is what lies furthest beyond two standard deviations: where no photo shows the cable, under a cover, waves
+    may run far and mean nothing.
+    """
+    size = np.abs(rows @ amounts)
+    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, covariance, rows), 0.0))
+    return np.asarray(rows[int(np.argmax(size - 2.0 * std))])
 
 
 def position_of(model: Model) -> Array:
@@ -248,6 +253,6 @@ class StiffnessVarying(Cause):
         return replace(model, bending=replace(model.bending, stiffness_profile=np.maximum(factor, LEAST)))
 
     def along_cable(self, variant: Variant, model: Model) -> tuple[str, Array]:
-        """The factor on the moments, where it is not at its least."""
+        """Change of the relative stiffness per unit of amount; 0 where that is held at its lower limit."""
         moves = profile(variant, position_of(model), from_beside=True)
         return "stiffness_profile", np.where(_factor(model) > LEAST, moves, 0.0)

@@ -79,8 +79,9 @@ class BearingFriction(Cause):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0.
 
-        That which grows with the force is ``amount`` at the largest one; a form of `by_step` adds the share ``amount``
-        over the plausible one of what the left bearing has at the step ``at``, and ``width`` times that at the right.
+        A moment that grows with the force is ``amount`` at the largest force. A form of `by_step` raises the left
+        bearing's moment at the step ``at`` by the share ``amount`` over the plausible amount, the right one's by
+        ``width`` times that.
         """
         bending = model.bending
         if variant.label in (WITH_FORCE, BY_STEP):
@@ -134,10 +135,7 @@ class RigidEnds(Cause):
         return 0.02 * facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both ends alike, or one. The trace grows with more than the square of the length, so a large one counts.
-
-        At twice the plausible size it points elsewhere than at a fifth: 4.8 mm scored 0.8 and removed 32.
-        """
+        """Both ends alike, or one; long ones too, as the trace at twice the plausible length points elsewhere."""
         return tuple(Variant(side, trace=trace, rare=bool(side)) for side in ("", *SIDES) for trace in (1.0, 10.0))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
@@ -186,9 +184,9 @@ class DisplacementOffset(Cause):
         return 0.02 * facts.travel
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Of the pushed steps, and where there is a mounted step, of that one too.
+        """Offset of the pushed steps; where there is a mounted step, also one that includes it.
 
-        A mounted cable is free of force wherever the zero of its rig lies: no ordinary rig presses it.
+        A mounted cable is force-free wherever the zero of the rig lies, so the second form is no ordinary one.
         """
         if "mounted" not in facts.branch:
             return (Variant(ordinary=ZERO_STD),)
@@ -217,7 +215,7 @@ class LengthError(Cause):
         return (Variant(ordinary=MEASURED),)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Shorten the cable by ``1 + amount``; less than a tenth of a cable is never stated (a slip of the point)."""
+        """Shorten the cable by ``1 + amount``, to no less than a tenth."""
         length = model.bending.length / max(1.0 + amount, 0.1)
         return replace(model, bending=replace(model.bending, length=length))
 
@@ -235,10 +233,9 @@ class InPlaneLoad(Cause):
         return 0.02 * facts.force_scale / facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Along and across the chord, both with either zero: a load at an angle is a sum of the two.
+        """Along and across the chord (a load at an angle is a sum of both), with either zero of the displacement.
 
-        Displacement counts from the mounted, force-free cable. Who mounts it under the load has another chord there
-        than who knows it from elsewhere, where the load does not act.
+        Displacement counts from the chord of the mounted cable, which was measured under the load or without it.
         """
         return (
             Variant("along the chord"),
@@ -248,10 +245,7 @@ class InPlaneLoad(Cause):
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Load the cable with ``amount`` along (``at`` 0) or across (``at`` 1) the chord.
-
-        There is one zero of displacement: a component beside another keeps the zero that is there.
-        """
+        """Load the cable along (``at`` 0) or across (``at`` 1) the chord by ``amount``; a second keeps the zero."""
         bending, (along, across) = model.bending, model.bending.load
         load = (along, across + amount) if variant.at > 0.5 else (along + amount, across)
         zero = "loaded" if variant.setting == UNDER_LOAD and bending.load == (0.0, 0.0) else bending.zero

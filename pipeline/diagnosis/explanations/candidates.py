@@ -17,13 +17,13 @@ MOST = 8
 
 
 def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = MARGIN, most: int = MOST) -> list[int]:
-    """Causes worth a refit: by linear chi-square gain, within a margin of the best.
+    """Causes worth a refit: those whose linear chi-square gain lies within a margin of the best.
 
     A cause whose forms may act together counts with its best two: a load at an angle to the chord scores little along
     it and across it. The margin is that of single forms, else many forms of one cause would push out the others.
 
-    ``any_sign``: scores of an inadmissible sign count too. About a base model in a false valley of K0 the sign of a
-    score says nothing: friction of the bearings on loading alone asks for a negative amount there.
+    ``any_sign``: scores of an inadmissible sign count too; about a base model in a false minimum of K0 the sign of a
+    score says nothing.
     """
     gains = np.zeros(len(suspicion.causes))
     np.maximum.at(gains, suspicion.owner, (suspicion.scores.z if any_sign else suspicion.statistic) ** 2)
@@ -53,10 +53,7 @@ MASKED = 20.0
 
 
 def kinds(suspicion: Suspicion, cause: int) -> list[int]:
-    """The loudest form of each kind of a cause.
-
-    A kind is a setting, a set of numbers, and a label too unless the forms act together: then others are added beside.
-    """
+    """The best form of each kind of a cause; a kind shares setting, tuned numbers and, unless forms add up, label."""
     own, found = suspicion.of(cause), dict[tuple[object, ...], int]()
     for k in (int(k) for k in own[descending(suspicion.statistic[own])]):
         form = suspicion.terms[k].variant

@@ -74,11 +74,10 @@ def conclusion_of(bench: Workbench, search: Search) -> Conclusion:
 
 
 def _classes(bench: Workbench, believed: Posterior, accepted: Explanation) -> tuple[tuple[int, ...], ...]:
-    """Names in the place of each cause of the accepted explanation, from the credible set.
+    """Names that may stand for each cause of the accepted explanation, from the credible set.
 
-    In another pair each cause stands for the one it is closer to; a single cause that does what a pair does stands for
-    both, and both causes of a pair for the single one that they stand instead of. What holds the accepted causes and
-    another one says nothing against them.
+    In another pair each cause stands for the one it is closer to; a single cause stands for both of a pair, and both of
+    a pair for a single cause. A set that holds the accepted causes and another one says nothing against them.
     """
     suspicion = bench.suspicion
     close = between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))

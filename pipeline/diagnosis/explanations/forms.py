@@ -42,9 +42,7 @@ def with_more_forms(
     *,
     hopeless: float,
 ) -> Fit:
-    """The model with as many further forms of a cause as pay for themselves, and as may get below ``hopeless``.
-
-    Each must remove ``shape_gain``, or `LEAST_SHARE` of the misfit where that is more.
+    """Add forms of a cause to the model as long as each removes ``shape_gain``, or `LEAST_SHARE` of the misfit if more.
 
     Parameters
     ----------
@@ -82,10 +80,10 @@ def with_more_forms(
 
 
 def in_all_forms(observation: Observation, fitted: Fit, cause: Cause, setting: str) -> Fit:
-    """The model with all forms of a cause whose amounts add up, then with those alone that it needs, each in its place.
+    """Fit all forms of a cause whose amounts add up, then keep those that the model needs.
 
-    Amounts of one sign are a nearly linear problem. Added one by one they are not: beside a round loop that is none no
-    form of it promises anything. Forms of each kind are tried by themselves too, as places are few.
+    Amounts of one sign are a nearly linear problem; added one by one they are not, as no single form of a round loop
+    promises anything. Forms of each kind are tried by themselves too, as places are few.
     """
     forms = [form for form in cause.variants(fitted.extension.facts) if form.setting == setting]
     kinds = {label: [form for form in forms if form.label == label] for label in (form.label for form in forms)}
@@ -114,8 +112,7 @@ def _spread(observation: Observation, fitted: Fit, cause: Cause, forms: Sequence
 def may_join(term: Term, fitted: Fit, setting: str) -> bool:
     """Whether a form can be one of those that act together.
 
-    A form without a place of its own, put beside itself, is the same form again: what two opposite amounts of it remove
-    (two tilts, together a distortion of the lens) is the trace of another cause.
+    Not one without a place of its own beside itself: what two opposite amounts of it remove is another cause's trace.
     """
     if term.variant.setting != setting:
         return False
@@ -124,10 +121,7 @@ def may_join(term: Term, fitted: Fit, setting: str) -> bool:
 
 
 def _starts(more: Suspicion, eligible: NDArray[np.bool_]) -> list[int]:
-    """The loudest form, and the loudest of the same name whose trace is taken at another amount.
-
-    A trace that grows with the square of the amount tells nothing of its sign.
-    """
+    """The form that scores highest, and the same at another amount (a square trace tells nothing of the sign)."""
     ranked = [int(k) for k in descending(more.statistic * eligible) if eligible[k]]
     first = more.terms[ranked[0]].variant.as_usual
     return [k for k in ranked if more.terms[k].variant.as_usual == first][:2]
@@ -139,10 +133,7 @@ def _loudest(statistic: NDArray[np.float64], eligible: NDArray[np.bool_]) -> flo
 
 
 def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) -> Fit:
-    """Drop the forms of a cause that later ones have made needless: each removes less than ``shape_gain``.
-
-    A form that is only there because it came first shares its amount with the law, and f_EI pays for it.
-    """
+    """Drop the forms of a cause that later ones have made needless: each removes less than ``shape_gain``."""
     while len(own := fitted.extension.terms_of(cause)) > 1:
         enough = fitted.chi2 + SHAPE_GAIN
         shorter = [
@@ -157,10 +148,9 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) 
 
 
 def as_one_form(observation: Observation, fitted: Fit, *, worse: float) -> Fit:
-    """One spot, piece or step in the place of several forms along the cable, if its chi-square is ``worse`` by no more.
+    """Replace several forms along the cable by one spot, piece or step, if chi-square rises by no more than ``worse``.
 
-    A loud spot that is sought from beside its place ends in a valley of its own, which further forms leave and steps do
-    not: what they add up to tells where the spot is.
+    A strong spot sought from beside its place ends in a minimum of its own; the sum of the forms tells where it is.
     """
     extension = fitted.extension
     count = len(extension.terms)

@@ -1,10 +1,9 @@
 """A profile along the cable in any form: a sum of waves in the place of the forms it was found by.
 
-A step, a kink, three waves or several bumps are no form of the catalogue, and what three forms leave of a strong one is
-many times the noise: it was then unexplained, or another cause was named beside it, and f_EI was up to 28 % off. Once a
-cause along the cable is in the model, its profile may be whatever the photos ask for. Photos of the force-free cable
-show K0(s) directly, photos under load by what does not grow with the moment, so that waves are a nearly linear problem;
-they come in blocks as long as each block pays for itself, and start from the profile that the forms add up to.
+A step, a kink or several bumps are no form of the catalogue, and what three forms leave of a strong one is many times
+the noise. Once a cause along the cable is in the model, its profile may be whatever the photos ask for. Photos of the
+force-free cable show K0(s) directly, photos under load by what does not grow with the moment, so that waves are a
+nearly linear problem; they come in blocks as long as each block pays for itself.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ EACH = 2.0 * WAVE_COST
 
 
 def with_free_profile(observation: Observation, fitted: Fit, cause: Cause, *, hopeless: float = np.inf) -> Fit:
-    """The model with the forms of a cause along the cable replaced by waves, where these explain the data better.
+    """Replace the forms of a cause along the cable by waves, where these explain the data better.
 
     Parameters
     ----------

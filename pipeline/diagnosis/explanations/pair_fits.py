@@ -1,9 +1,8 @@
 """Pairs of causes as they are fitted: a single cause with what scores beside it.
 
-A pair gets all forms of its causes, as a single cause has: without its lesser part a load at an angle left a wrong pair
-the better one. Forms with a place of their own (elements of friction, profiles along the cable) cost several refits, so
-only the best pairs get them (`in_any_form`): beside friction of the bearings a loop of two elements fitted by one was a
-quarter too small and left more than noise, so two right names were refused.
+A pair gets all forms of its causes, as a single cause has: without its lesser part a load at an angle leaves a wrong
+pair the better one. Forms with a place of their own (elements of friction, profiles along the cable) cost several
+refits, so only the best pairs get them (`in_any_form`).
 """
 
 from __future__ import annotations
@@ -55,10 +54,7 @@ def together(bench: Workbench, directions: Sequence[int]) -> list[Explanation]:
 
 
 def with_all_forms(bench: Workbench, found: list[Explanation]) -> list[Explanation]:
-    """The pairs with further forms of their causes, the best first; one that stays far above it is left as it is.
-
-    A load at an angle to the chord is no better than half of itself beside another cause, as it is alone.
-    """
+    """Pairs, best first, with further forms of their causes; one that stays far above the best is left as it is."""
     every: dict[frozenset[int], Explanation] = {}
     for pair in sorted(found, key=lambda e: -e.worth):
         if frozenset(pair.causes) not in every:
@@ -68,10 +64,7 @@ def with_all_forms(bench: Workbench, found: list[Explanation]) -> list[Explanati
 
 
 def with_own_forms(bench: Workbench, pair: Explanation, *, rival: float) -> Explanation:
-    """A pair with further forms of its causes, as far as they can bring it near a rival's chi-square.
-
-    Of causes whose forms are directions (a load, a tilt); a form with a place of its own is tuned instead.
-    """
+    """A pair with further directions of its causes (a load, a tilt), as far as they can bring it near a rival."""
     fitted, hopeless, facts = pair.fitted, rival + LEAST, bench.facts
     for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
         if not kind.combines or any(form.has_place for form in kind.variants(facts)):
@@ -82,10 +75,7 @@ def with_own_forms(bench: Workbench, pair: Explanation, *, rival: float) -> Expl
 
 
 def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanation]:
-    """What the best pairs become with further forms of their own place, and with profiles of any form.
-
-    One that cannot come near the best one so far, as far as its scores tell, is left out.
-    """
+    """The best pairs with further forms that have a place, and with profiles of any form; hopeless ones left out."""
     new: list[Explanation] = []
     for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
         rival = min(e.fitted.chi2 for e in (*found, *new))
@@ -103,10 +93,7 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
 
 
 def by_step(bench: Workbench, one: Explanation) -> list[Explanation]:
-    """An explanation with its causes differing from step to step, in one way at a time: the evidence says which it is.
-
-    Of a cause that is there in one form.
-    """
+    """An explanation with causes (of one form each) that differ from step to step, in one way at a time."""
     known, found = one.fitted.extension, []
     for kind in (bench.suspicion.causes[cause] for cause in one.causes):
         own = known.terms_of(kind)

@@ -33,7 +33,7 @@ ELSEWHERE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Addition:
-    """A term put beside a fitted model, with what the linear model says of it.
+    """A term to be added to a fitted model, with its linear estimate.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Addition:
         return Extension(known.base, known.facts, (*known.terms, self.term))
 
     def start(self, vector: Array, *, share: float = 1.0) -> Array:
-        """Vector of `extension`: one of the model so far, then the term with a share of its amount, kept sane."""
+        """Vector to start `extension` from: the model so far, then a share of the term's amount, within its limits."""
         term, usual = self.term, self.term.cause.plausible(self.base.extension.facts)
         traced = TRACE * abs(term.variant.trace) * usual
         # what leaves as much trace as the linear estimate promises, where the trace grows with a power of it
@@ -78,7 +78,7 @@ def fit_term(
     hopeless: float = np.inf,
     tuned: bool = True,
 ) -> Fit | None:
-    """Fit with one further term, the best from all starts that are worth trying.
+    """Fit a model with one further term, from every start that is worth trying; the best fit.
 
     Parameters
     ----------
@@ -117,10 +117,9 @@ def cost(fitted: Fit) -> float:
 
 
 def linear_start(observation: Observation, added: Addition) -> Array:
-    """The linear estimate of an amount and of what it leaves to the other parameters, or the share that fits best.
+    """Start of a refit: the share of the linear estimate that fits best, the other parameters moved along with it.
 
-    A cause put beside parameters that stay where they were starts far from its valley: they had taken its place. So the
-    others move as far as the linear model says; only the last trial leaves them, and takes the least of the amount.
+    Parameters that stayed would keep the place of the cause; only the last, smallest trial leaves them.
     """
     base, extension = added.base, added.extension
     size = np.linalg.norm(base.jacobian, axis=0)
@@ -144,11 +143,7 @@ def _cost_at(observation: Observation, extension: Extension, vector: Array, near
 
 
 def _elsewhere(added: Addition) -> list[Array]:
-    """Starts with the law and K0 that photos show, and from the other side of straight, where K0 may lie there.
-
-    A load in the plane may turn the mounted cable over, and no base model without it has a K0 of the true sign. Where
-    no photo at rest shows the side, friction of the bearings does the same.
-    """
+    """Starts with the law and K0 that photos show, and with K0 of the other sign where it may be wrong."""
     base, facts = added.base.extension.base, added.base.extension.facts
     at = base.pre_curvature_index
     if at is None or len(base.names) != len(added.base.vector):

@@ -1,15 +1,15 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what begins between two holds beside the likeliest -> what is likely beside the likeliest four refitted -> causes exchanged while a pair that shares one with the likeliest
-is likelier -> pairs pruned of what they do not need -> where something else is likelier still, the nearest cause with
-all others -> probabilities of all.
+-> what begins between two holds, beside the likeliest four -> what is likely beside these -> causes exchanged while a
+pair that shares one with the likeliest is likelier -> pairs pruned of what they do not need -> where something else is
+likelier still, the nearest cause with all others -> probabilities of all.
 
 Two causes may hide each other, each below its threshold: where no single one is likely, or something else is likelier,
 the pair that removes most by the linear scores is fitted from both at once (`together`).
 
-A refit may fail to find its valley where another one, from beside it, does: so a pair whose weaker member lies within
-2.5 standard deviations of nothing is fitted again without it.
+A refit may miss its minimum where another one, from beside it, finds it: so a pair whose weaker member lies within 2.5
+standard deviations of zero is fitted again without it.
 """
 
 from __future__ import annotations
@@ -68,10 +68,7 @@ class Search:
         return posterior(self.hypotheses, self.causes)
 
     def add(self, found: Sequence[Explanation]) -> list[Explanation]:
-        """Weigh refits; the likeliest fitted to their end and weighed with something else besides. Returned: all.
-
-        Weighing that takes ten times the time; where something else is likelier than all causes, few add to it.
-        """
+        """Weigh refits and return them; the likeliest are fitted to the end and weighed with something else too."""
         rest = self.hypotheses[0].rest
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
@@ -85,10 +82,7 @@ class Search:
         return one if fitted is one.fitted else explanation_of(one.causes, self.bench.base, fitted)
 
     def singles(self) -> list[Explanation]:
-        """Refit causes that matter or come near the best score; all others where something else is likelier than these.
-
-        The score of stiff ends, whose trace grows with the square of the amount, promises little where they are long.
-        """
+        """Refit causes that matter or score near the best one; all the others where something else is likelier."""
         linear = {one.causes[0] for one in self.posterior.believed if len(one.causes) == 1 and one.probability > ALSO}
         near = candidates(self.bench.suspicion, any_sign="mounted" not in self.bench.facts.branch)
         tried = [*near, *sorted(linear - set(near))]
@@ -123,9 +117,8 @@ class Search:
     def pairs(self, singles: Sequence[Explanation], found: list[Explanation]) -> None:
         """Refit pairs besides those ``found``: single causes with what scores most beside each.
 
-        Pairs are exchanged until none that shares a cause with the likeliest one is likelier: of two causes that act
-        together one alone may look like a third, and what scores most beside that third is neither. Each stays in the
-        form that it has in the pair.
+        Until no pair that shares a cause with the likeliest one is likelier: one of two causes that act together may
+        alone look like a third, and what scores most beside that third is neither.
         """
         bench, begun = self.bench, {self._forms(one, one.causes[0]) for one in singles}
         found += [pair for one in singles for pair in self._with_others(one)]
@@ -162,7 +155,7 @@ class Search:
         return pairs_beside(self.bench, one, second, [*dict.fromkeys([*candidates(second)[:2], *likely])])
 
     def _members_alone(self, begun: set[Forms]) -> Iterator[Explanation]:
-        """Causes of what is the likeliest pair by then, in forms that no pairs began with, fitted alone."""
+        """Causes of the likeliest pair, each fitted alone in the form that it has there, if that is new."""
         while True:
             likeliest = next(iter(self.posterior.explanations(count=2)), None)
             pair = None if likeliest is None else likeliest.found
@@ -215,7 +208,7 @@ class Search:
             self.hypotheses += [refitted(self.grid.plain, explanation, bench.facts) for explanation in found]
 
     def pairs_speak(self, best: Explanation) -> bool:
-        """Whether the data make two causes, or something else, likelier than they were beforehand; or may do so."""
+        """Whether the data make, or may make, two causes or something else likelier than they were beforehand."""
         second, beside, rest = self.beside(best), self.weighed_beside(best), self.hypotheses[0].rest
         mine = next(one.plain for one in self.hypotheses if one.found is best)
         for cause, (plain, _) in beside.further.items():

@@ -1,8 +1,8 @@
 """One cause put into the model, in the form or the few forms of it that explain the data best.
 
-A score says where to begin, and no more: a soft spot on one side sounds like a stiff one on the other until it has
-found its place. So a refit starts from several forms. Of each setting (what all forms that act together have in common)
-the best goes on, further forms are added where they may act together, and the cheapest model is the explanation.
+A score says where to begin, and no more: a soft spot on one side looks like a stiff one on the other until it has found
+its place. So a refit starts from several forms. Of each setting (what all forms that act together have in common) the
+best goes on, further forms are added where they may act together, and the cheapest model is the explanation.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def refit_one(
 
 
 def _several(observation: Observation, one: Fit, kind: Cause, setting: str, *, hopeless: float) -> Fit:
-    """A model with one form of a cause, with whatever further forms pay for themselves."""
+    """Add to a model with one form of a cause whatever further forms pay for themselves."""
     several = with_more_forms(observation, one, kind, setting, hopeless=hopeless)
     worse = SHAPE_GAIN * (len(several.extension.terms) - 1)
     several = as_one_form(observation, several, worse=worse)
@@ -61,10 +61,9 @@ def _in_any_form(
     cause: int,
     hopeless: float,
 ) -> Fit | None:
-    """A profile along the cable, by waves where its loudest form leaves more than noise and these do not.
+    """A profile along the cable: as waves (a nearly linear problem) where its best form leaves more than noise.
 
-    Waves are a nearly linear problem, spots that are moved and widened one by one are not: of a sharp step three of
-    them left ten times the noise after five times the work. Where fewer forms do as well, they are the explanation.
+    Where fewer forms do as well as the waves, they are the explanation.
     """
     kind, direction = suspicion.causes[cause], suspicion.best(cause)
     to_the_noise = FITS * (len(base.residual) - base.extension.size)
@@ -118,11 +117,7 @@ def _fit_form(
     *,
     hopeless: float,
 ) -> Fit | None:
-    """Fit with one form in the model, its place and width tuned along unless that stalls.
-
-    Where the trace has kinks (slip), a form that is tuned may stall; the form as it is scored does not. One whose place
-    went to the end of its range comes back from there when it is gone on with.
-    """
+    """Fit with one form in the model, its place and width tuned too unless that stalls (traces of slip have kinks)."""
     found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
     if found is None or found.converged or not suspicion.terms[direction].variant.tuned:
         return found
@@ -132,10 +127,7 @@ def _fit_form(
 
 
 def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
-    """Forms to start a refit with: up to four nearly as loud as the loudest, and the loudest of each other kind.
-
-    A soft spot on one side sounds like a stiff one on the other until it has found its place, and like smooth forms.
-    """
+    """Forms to start a refit with: up to four that score near the best one, and the best of each other kind."""
     own = suspicion.of(cause)
     ranked = [int(k) for k in own[descending(suspicion.statistic[own])]]
     least = NEARLY_AS_LOUD * suspicion.statistic[ranked[0]]

@@ -104,10 +104,7 @@ def curve(fitted: Fit, *, covariance: Array | None = None, other: Fit | None = N
 
 
 def forms(fitted: Fit, cause: str, *, columns: int, covariance: Array | None = None) -> list[CauseForm]:
-    """The forms of a cause as they stand in a fitted model, with their share in the factor of its `curve`.
-
-    ``columns`` is the number of columns of that factor: others come last, and move the amounts of no cause.
-    """
+    """The forms of a cause in a fitted model, with their rows in the factor (``columns`` wide) of its `curve`."""
     used, root = _root(fitted, covariance)
     found = []
     for at, term in zip(fitted.extension.amounts_at, fitted.extension.terms, strict=True):
@@ -175,7 +172,7 @@ def curve_change(before: Curve, after: Curve) -> float | None:
 
 
 def stiffness_change_linear(fitted: Fit, columns: Array, amounts: Array) -> Array:
-    """The same (k,), to first order, for effects that are in the data but not in the model.
+    """Relative rms change (k,) of f_EI, to first order, by effects that are in the data but not in the model.
 
     ``columns`` (N, k) are whitened traces per unit of ``amounts`` (k,); the fit then moves by ``J^+ S a``.
     """

@@ -138,7 +138,7 @@ def _break(told: _Told, trial: _Trial, whole: _Trial) -> Break:
 
 @dataclass(frozen=True, eq=False)
 class _Told:
-    """Forces as the photos tell them, and as measured; n steps with a force, p parameters, m rows without forces.
+    """Forces that follow from the photos, and as measured; n steps with a force, p parameters, m rows without forces.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class _Told:
 
     @classmethod
     def by_photos(cls, bench: Workbench) -> _Told | None:
-        """Fit the base model to all but the forces; None where that does not settle.
+        """Fit the base model to all but the forces; None where that does not converge.
 
         Photos leave the factor of the forces open: one force, the nearest to the base model's, sets it.
         """
@@ -273,7 +273,7 @@ class _Told:
     def _rest(
         self, course: Array, column: Array | None = None, *, scale: float | None = None, weight: Array | float = 1.0
     ) -> tuple[float, float, float]:
-        """Chi-square left by ``F = scale course model`` plus a free amount of ``column``, that amount and its std."""
+        """Chi-square left by ``F = scale course model`` plus a free amount of ``column``; amount and std."""
         if scale is None:
             scale = self._scale(np.broadcast_to(np.asarray(weight) > 0.0, self.force.shape), course)
         whiten = weight / self.std

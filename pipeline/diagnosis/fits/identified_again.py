@@ -1,4 +1,4 @@
-"""f_EI of a model with causes in it: the mean over all priors of its law, and what forms of the causes leave open.
+"""f_EI of a model with causes in it: the mean over all priors of its law, and how far other forms would move it.
 
 Sums of few forms stand for what nobody knows the form of. How far the law goes where other forms are let in is part of
 its band, and the size of the cause is known no better than the sum over all of them.
@@ -63,12 +63,11 @@ def identified_again(
 
 
 def _with_other_forms(observation: Observation, again: Identified) -> Identified:
-    """Where the law lies if the forms of a cause that add up may be any: part of the band, and no better answer.
+    """Where the law lies if a cause has any forms that add up: part of the band, and no better answer.
 
-    A sum of few elements stands for a loop of friction whose true form nobody knows (Bouc and Wen's is none).
-    Elements of other slips, of either sign, take something from the law or give to it. How far it goes with them is as
-    far as it is off: 0.7 to 1.7 % on five loops of such forms (true errors 1.2 to 1.6 %), 0.5 % on one of two elements.
-    The size of the cause is known no better than the sum over all of them is, see `SPREAD`.
+    A sum of few elements stands for a loop of friction whose true form nobody knows. Elements of other slips, of either
+    sign, move the law about as far as it is off: 0.7 to 1.7 % on five loops (true errors 1.2 to 1.6 %). The size of the
+    cause is known no better than the sum over all of them is, see `SPREAD`.
     """
     fitted = again.fitted
     causes, beside = _other_forms(observation, fitted)

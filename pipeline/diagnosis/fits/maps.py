@@ -1,9 +1,8 @@
 """Residuals for people: a map over arc length and step, in sigma and in m; forces in N; chords in m.
 
 The shape residual of a photo is measured minus simulated position along the normal, less what the errors of its own
-bearing axes make of it. On the map it is averaged over a
-few points along the cable, and its sigma is that of the average, correlation along s included; so an honest model shows
-values within about 2.
+bearing axes make of it. On the map it is averaged over a few points along the cable, and its sigma is that of the
+average, correlation along s included; so an honest model shows values within about 2.
 """
 
 from __future__ import annotations
@@ -119,7 +118,7 @@ def rms_errors(observation: Observation, fitted: Fit, steps: list[int]) -> tuple
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """Where a whitened field sits.
+    """At which step and place, and in which kind of data, a residual is largest.
 
     Attributes
     ----------
@@ -141,7 +140,7 @@ class Whereabouts:
 
 
 def whereabouts(observation: Observation, field: Array) -> Whereabouts:
-    """Where a whitened field (N,) sits."""
+    """At which step and place, and in which kind of data, a whitened residual (N,) is largest."""
     square = field**2
     total = max(float(square.sum()), 1e-300)
     share = {KINDS[k]: float(square[observation.rows.kind == k].sum()) / total for k in range(len(KINDS) - 1)}

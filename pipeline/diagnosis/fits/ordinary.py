@@ -22,7 +22,7 @@ from rod.inverse.observation import Observation
 
 
 def beside_ordinary_rig(observation: Observation, fitted: Fit, suspicion: Suspicion) -> Fit | None:
-    """A model fitted with what every rig has a little of, known to that; None where it has no equilibrium."""
+    """Fit a model with the small errors that every rig has, each with its usual size; None without an equilibrium."""
     extension = fitted.extension
     present = {term.cause.name for term in extension.terms}
     terms = tuple(
@@ -40,7 +40,7 @@ SEEN = 2.0
 
 
 def told(found: Fit) -> tuple[Finding, ...]:
-    """What a rig is off by, as far as the data show it."""
+    """Finding on what a rig is off by, as far as the data show it."""
     parts = []
     for k, term in enumerate(found.extension.terms):
         amount, std = found.amount(k)

@@ -61,10 +61,9 @@ def outlier_fault(test: MeasuredTest, outlier: Outlier) -> Faults:
 
 
 def joined_with_outlier(found: Faults, outlier: Faults) -> Faults:
-    """Both; where photo and displacement of the step at fault contradict each other too, its photo is of another step.
+    """Join two faults; where photo and displacement of one step contradict each other, its photo is of another step.
 
-    With the displacement taken from such a photo, the force of the step stands alone against it. Force and displacement
-    as logged are right then, and one photo is all that is wrong.
+    With the displacement taken from such a photo, the force would seem wrong; both are right as logged.
     """
     wrong = (outlier.photos | outlier.forces) & found.doubted.keys()
     if outlier.corrections or not wrong:

@@ -1,4 +1,4 @@
-"""All directions of suspicion about a fitted model: one whitened column for every form of every cause.
+"""Scores of all causes about a fitted model: one whitened column for every form of every cause.
 
 A column is the change of the residual when the cause is put into the fitted model at a share of its plausible size, per
 unit of amount: large enough that a cause whose trace grows with the square of its amount (stiff ends) is seen, small
@@ -83,8 +83,8 @@ class Suspicion:
 def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, of_law: bool = False) -> Suspicion:
     """Score every form of every cause about a fitted model.
 
-    Causes that are in the model already are scored with forms of theirs only if forms may be combined. What a law of
-    any form takes over is no explanation of anything; ``of_law`` asks for such forms alone.
+    Causes in the model already are scored only with forms that may be combined. Forms that the law takes over explain
+    nothing; ``of_law`` asks for these alone.
 
     Parameters
     ----------
@@ -120,9 +120,8 @@ def ordinary(suspicion: Suspicion) -> Array:
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:
     """Whitened column (N,) of one form of a cause, from zero to ``amount``.
 
-    Where that amount leaves no equilibrium, smaller and smaller ones are tried, then the other sign: a base model that
-    has taken a large cause for its own lives at its limits (a law that hardly rises), and a cause without a trace would
-    never be named. A column of zeros says that not even a trace can be simulated.
+    Where that amount leaves no equilibrium, smaller ones are tried, then the other sign: a base model that stands for a
+    large cause lies at its limits. A column of zeros says that not even a trace can be simulated.
     """
     facts = fitted.extension.facts
     smaller = [amount * share for share in SMALLER]

@@ -1,7 +1,6 @@
 """From a measured test to a fitted base model with all suspects scored: what every later step works on.
 
-Strategy: fit the base model (`rod.inverse.base_fit`); score all suspects; simulate the family of scores. The law is one
-of any form: a law of another form is no cause.
+Fit the base model (`rod.inverse.base_fit`), score all causes, simulate the family of scores.
 """
 
 from __future__ import annotations
@@ -121,7 +120,7 @@ def scored(
     causes: Sequence[Cause],
     settings: DiagnosisSettings,
 ) -> Workbench:
-    """The workbench of a fitted model: all causes scored, null distribution and threshold of these scores."""
+    """Score all causes about a fitted model, with the null distribution and the threshold of these scores."""
     fitted = replace(fitted, extension=replace(fitted.extension, facts=_with_bends(fitted)))
     suspicion, in_law = (suspect(observation, fitted, causes, of_law=of_law) for of_law in (False, True))
     maxima = null_maxima(
@@ -136,7 +135,7 @@ def scored(
 
 
 def _with_bends(fitted: Fit) -> Facts:
-    """The facts with the largest bend that the cable had reached at each step by the fitted model."""
+    """The test geometry with the largest bend that the cable had reached at each step, by the fitted model."""
     rest = fitted.extension.base.pre_curvature(fitted.vector)
     bends = [float(step.kappa.max()) - rest for step in fitted.run.steps]
     return replace(fitted.extension.facts, bends=np.maximum.accumulate([0.0, *bends])[1:])

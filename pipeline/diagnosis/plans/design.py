@@ -162,7 +162,7 @@ class Design:
         return Message("plan.known", low_per_m=low, high_per_m=high, **stds)
 
     def _repr_html_(self) -> str:
-        """Show the outlook in a notebook."""
+        """Outlook as HTML for a notebook."""
         heads = ("shows from", "plausible", "visible", "f_EI off")
         rows = [
             (name, "; ".join(f"{head} {text}" for head, text in zip(heads, texts, strict=True)))

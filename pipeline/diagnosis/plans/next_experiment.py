@@ -4,8 +4,8 @@ For each protocol that was not made yet the most probable explanation is simulat
 to that to first order, and what remains of the rival's misfit (in sigma) says how far the protocol takes the two apart:
 photograph the force-free cable; unload in the same steps; come back to displacement zero; turn the cable end for end.
 Every protocol is held against plain repetition, whose twice as many data give the square root of two by themselves.
-Where none is expected to separate the rivals, one of them may be settled by itself (a spirit level, dead weights); else
-it is said that nothing here separates them.
+Where none is expected to separate the rivals better than that, one of them may be settled by itself (a spirit level,
+dead weights); else the same test once more is proposed, or it is said that nothing here separates them.
 """
 
 from __future__ import annotations
@@ -93,23 +93,18 @@ def next_experiment(
     }
     repeated = apart["next.repeat"]
     # what is no better than the same once more is no experiment of its own
-    better = {what: sigma for what, sigma in apart.items() if sigma == repeated or sigma > repeated + BETTER}
+    better = {what: sigma for what, sigma in apart.items() if sigma > repeated + BETTER}
     enough = [what for what, sigma in better.items() if sigma >= settings.separated]
     differ = (causes[cause] for cause in differing if causes[cause].seat != "cable")
     outside = [cause.name for cause in differ if still_open(cause, bench)]
     if not enough and outside:
         said = Message("next.settled", by=entry("settled", outside[0]))
         return NextExperiment(**NextExperiment.told(said), separates=names, repeated_sigma=repeated)
-    what = enough[0] if enough else max(better, key=lambda name: better[name])
-    if better[what] < TELLS:
-        what, names = NOTHING, []
-    told = NextExperiment.told(Message(what))
-    return NextExperiment(
-        **told, separates=names, sigma=better.get(what, max(better.values())), repeated_sigma=repeated
-    )
-
-
-NOTHING = "next.nothing"
+    what = enough[0] if enough else max(better, key=lambda name: better[name], default="next.repeat")
+    sigma = apart[what]
+    if sigma < TELLS:
+        what, names = "next.nothing", []
+    return NextExperiment(**NextExperiment.told(Message(what)), separates=names, sigma=sigma, repeated_sigma=repeated)
 
 
 BETTER, TELLS = 1.0, 2.0

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.begun import BEGUN
-from pipeline.diagnosis.causes.profile import WAVE_COST, is_wave, largest_of
+from pipeline.diagnosis.causes.profile import WAVE_COST, is_wave, largest, largest_of
+from rod.inverse.cause import Variant
 from rod.inverse.fit import Fit
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +47,7 @@ class Explanation:
 
     def sigma(self, cause: Cause) -> float:
         """How many standard deviations the amounts of a cause, all its forms together, lie from zero."""
-        extension = self.fitted.extension
-        at = [extension.amounts_at[k] for k in extension.terms_of(cause)]
-        amount, covariance = self.fitted.vector[at], self.fitted.covariance[np.ix_(at, at)]
+        _, amount, covariance = self._forms(cause)
         return float(np.sqrt(max(float(amount @ np.linalg.solve(covariance, amount)), 0.0)))
 
     def amount(self, cause: Cause) -> tuple[float, float]:
@@ -54,19 +56,34 @@ class Explanation:
         What differs from step to step does so about that size.
         That of a profile along the cable is its largest deviation beyond doubt, of all forms together.
         """
-        extension, own = self.fitted.extension, self.fitted.extension.terms_of(cause)
+        forms, amounts, covariance = self._forms(cause)
+        if cause.varies and len(forms) > 1:
+            return _total(largest_of(forms, amounts, covariance, cause), amounts, covariance)
+        if cause.additive:
+            return _total(np.ones(len(forms)), amounts, covariance)
+        whole = [k for k, form in enumerate(forms) if not np.isfinite(form.known)]
+        return max((_total(np.eye(len(forms))[k], amounts, covariance) for k in whole), key=lambda pair: abs(pair[0]))
+
+    def size(self, cause: Cause) -> tuple[float, float, str]:
+        """Stated size of a cause, its standard deviation and unit: what its forms make up, else its amount."""
+        forms, amounts, covariance = self._forms(cause)
+        made = cause.together(forms, self.fitted.extension.facts)
+        if made is None:
+            return *self.amount(cause), cause.unit
+        unit, rows = made
+        return *_total(largest(rows, amounts, covariance), amounts, covariance), unit
+
+    def _forms(self, cause: Cause) -> tuple[list[Variant], Array, Array]:
+        """The k forms of a cause as fitted, their amounts (k,) and the covariance (k, k) of these."""
+        extension, vector = self.fitted.extension, self.fitted.vector
+        own = extension.terms_of(cause)
         at = [extension.amounts_at[i] for i in own]
-        covariance = self.fitted.covariance[np.ix_(at, at)]
-        if cause.varies and len(own) > 1:
-            forms = [extension.formed(self.fitted.vector, i).variant for i in own]
-            weight = largest_of(forms, self.fitted.vector[at], covariance, cause)
-        elif cause.additive:
-            weight = np.ones(len(own))
-        else:
-            whole = [k for k in own if not np.isfinite(extension.terms[k].variant.known)]
-            return max((self.fitted.amount(i) for i in whole), key=lambda pair: abs(pair[0]))
-        variance = float(weight @ covariance @ weight)
-        return float(weight @ self.fitted.vector[at]), float(np.sqrt(max(variance, 0.0)))
+        return [extension.formed(vector, i).variant for i in own], vector[at], self.fitted.covariance[np.ix_(at, at)]
+
+
+def _total(weight: Array, amounts: Array, covariance: Array) -> tuple[float, float]:
+    """Weighted sum of amounts and its standard deviation."""
+    return float(weight @ amounts), float(np.sqrt(max(float(weight @ covariance @ weight), 0.0)))
 
 
 def explanation_of(causes: tuple[int, ...], base: Fit, fitted: Fit) -> Explanation:

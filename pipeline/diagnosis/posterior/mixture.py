@@ -97,10 +97,7 @@ def widening(
 def _refits(
     grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Centre, shifts: dict[tuple[int, bool], Array]
 ) -> Iterator[_Parts]:
-    """Components of the base model and of every refit, for the error models that count; some lie beside their fit.
-
-    A cause beside something else that was weighed by the linear model alone lies about the base model as well.
-    """
+    """Components of the base model and of every refit, for the error models that count; some lie beside their fit."""
     chances: dict[int, tuple[Fit, dict[bool, float]]] = {}
     for one in posterior.believed:
         fitted = one.found.fitted if one.found else base

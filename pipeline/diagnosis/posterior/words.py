@@ -8,7 +8,7 @@ Verdict = Literal["adequate", "named", "class", "two_causes", "unexplained", "un
 
 
 def verdict(*, found: bool, unmodelled: bool, classes: tuple[tuple[int, ...], ...], powerless: bool) -> Verdict:
-    """The word of contract.md.
+    """The verdict, a word of contract.md.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from rod.inverse.fit import Fit
 
 
 def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
-    """What is likeliest to be something else."""
+    """Say where in the data that is which is likeliest to be something else."""
     observation, fitted = bench.observation, conclusion.fitted(bench)
     field = something_else(conclusion.grid, fitted)
     begun = _begun(bench, fitted)

@@ -148,8 +148,8 @@ def what_next(
 ) -> NextExperiment | None:
     """What separates the names that are confused; without any, what tells most about what these data cannot show.
 
-    The order is that of use: a class can be settled, a misfit of no name needs a second look at the same cable, what
-    was never unloaded hides whole causes, and the force calibration is unseen always.
+    In this order: a class can be settled, a misfit without a name needs a second look at the same cable, a test without
+    unloading hides whole causes, and the force calibration is never seen.
     """
     if conclusion.accepted is not None and conclusion.rivals and not unexplained:
         return next_experiment(bench, conclusion.accepted, conclusion.rivals, settings)

@@ -1,7 +1,7 @@
-"""All causes of the catalogue side by side: how loud each is, how large it would be, what it would do to f_EI.
+"""All causes of the catalogue side by side: how clearly each is seen, how large it would be, what it would do to f_EI.
 
-Loudness and harm are unrelated: a cause may be seen clearly and leave f_EI alone, or spoil it unseen. So the table has
-both, the blind spots are those of the second kind, and the table of cosines says which causes cannot be told apart.
+A cause may be seen clearly and leave f_EI alone, or spoil it unseen (a blind spot); the table of cosines says which
+causes cannot be told apart.
 """
 
 from __future__ import annotations
@@ -116,10 +116,7 @@ def _closeness(bench: Workbench) -> Array:
 
 
 def seen_at_plausible_size(bench: Workbench, rows: list[CauseRow]) -> list[CauseRow]:
-    """Rows of causes that a plausible size would have shown, the clearest first.
-
-    A cause that is part of the law in one of its forms may hide in it.
-    """
+    """Rows of causes that a plausible size would have shown, the clearest first; none that the law may hide."""
     told = [cause for k, cause in enumerate(bench.suspicion.causes) if not bench.in_law.of(k).size]
     plausible = {cause.name: cause.plausible(bench.facts) for cause in told}
     seen = [r for r in rows if r.minimal_detectable is not None and r.minimal_detectable <= plausible.get(r.name, 0.0)]

@@ -216,6 +216,25 @@ def test_photo_residuals_stand_at_the_points_of_the_centerline(found, measured):
         assert np.abs(fitted - step.shape.kappa)[step.shape.s.size // 2] < 0.1  # 1 % of the largest
 
 
+def test_errors_of_the_axes_are_neither_in_the_residuals_of_a_photo_nor_in_their_band(found, measured, settings):
+    """Axes that are known ten times less well shift and turn the whole midline, which the residual leaves out."""
+    axis = 3e-4
+
+    def doubted(step):
+        covariance = step.shape.covariance.copy()
+        covariance[0, 0] += axis**2
+        covariance[1, 1] += 2.0 * (axis / step.chord) ** 2
+        shape = replace(step.shape, covariance=covariance)
+        return replace(step, shape=shape, chord_std=float(np.hypot(step.chord_std, np.sqrt(2.0) * axis)))
+
+    before = identification_parts(found).photos
+    after = identification_parts(identify_test(with_steps(measured, doubted), settings)).photos
+    for number, photo in after.items():
+        seen = next(step.shape.seen for step in measured.steps if step.step == number)
+        std, own = (np.array(one.shape_residual_std_m)[seen] for one in (photo, before[number]))
+        assert np.median(std) < 1.5 * np.median(own) < 0.1 * axis
+
+
 def test_an_error_that_forces_have_in_common_is_in_both_bands(found, measured, settings):
     errors = {s.step: 0.004 * s.force for s in measured.steps if s.step >= 3}
     doubted = identify_test(replace(measured, common_force_errors=(errors,)), settings)

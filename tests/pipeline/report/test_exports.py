@@ -222,3 +222,6 @@ def test_constants_stand_once_and_the_cause_with_its_amount(diagnosed):
     (cause,) = result.diagnosis.causes
     row = frame.set_index("quantity").loc[cause.name]
     assert (row["value"], row["std"]) == (cause.estimate, cause.std) and "without it" in row.note
+    # the nearest cause of a misfit that none explains was named by nobody
+    left = result.diagnosis.model_copy(update={"verdict": "unexplained"})
+    assert cause.name not in simulation_frame(result.model_copy(update={"diagnosis": left})).quantity.to_numpy()

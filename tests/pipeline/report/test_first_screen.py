@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.report.answer import first_screen
+from pipeline.report.answer import first_screen, pre_curvatures
 from pipeline.report.diagnosed import diagnosis_view
 from pipeline.report.document import report_html
 from pipeline.report.evidence import main_figure, pointer_data
@@ -38,6 +38,58 @@ def test_what_could_hide_is_told_where_it_would_leave_the_band(diagnosed):
     ).hidden
     assert [line.split(",")[0] for line in told] == ["hysteresis", "plastic set"]
     assert told[0] == "hysteresis, by up to 27 % of f_EI: unloading in the same steps would show it."
+
+
+def test_what_is_quoted_lies_where_the_data_determine_it(diagnosed):
+    """Where hardly any of the cable was bent so far the band runs away: 8.5 +- 2.0 at the end of 18.0 +- 0.9."""
+    result = diagnosed("unexplained")
+    curve = result.inverse.curve
+    std = np.array(curve.tangent_std_Nm2)
+    std[-3:] *= 12.0
+    spiked = curve.model_copy(update={"tangent_std_Nm2": std.tolist()})
+    result = result.model_copy(update={"inverse": result.inverse.model_copy(update={"curve": spiked})})
+    (kappa, _, band) = result.answer.curve.ends()[1]
+    assert kappa == curve.kappa_per_m[-4] and band == std[-4]
+    assert f"κ\xa0=\xa0{kappa:.3g}\xa01/m" in first_screen(result, WORDS, SETTINGS).sentence
+
+
+def test_what_lacks_the_cause_that_was_found_shows_no_pre_curvature(diagnosed):
+    """A K0 of -1.4 by the simulation without the cause stood beside the 1.2 of the answer."""
+    assert len(pre_curvatures(diagnosed("adequate"))) > len(pre_curvatures(diagnosed("named"))) > 0
+    assert not {"inverse", "balance"} & set(pre_curvatures(diagnosed("named")))
+
+
+def test_ways_that_disagree_do_so_by_the_probability_of_their_difference(diagnosed):
+    """By bands that hold errors of both, 2.9 % were expected of two ways that contradict each other at 1 %."""
+    result = diagnosed("unexplained")
+    apart = result.agreement.model_copy(update={"compatible": False, "p_value": 1e-3})
+    told = first_screen(result.model_copy(update={"agreement": apart}), WORDS, SETTINGS).agreement
+    assert "(p = 0.001)" in told and "expected" not in told
+
+
+def test_a_sign_that_a_cause_cannot_have_is_named_and_no_probability_is_certain(diagnosed):
+    result = diagnosed("named")
+    rows = [
+        r.model_copy(update={"z": -13.0, "p_adjusted": 1.0}) if r.name == "bearing_friction" else r
+        for r in result.diagnosis.table
+    ]
+    sure = [cause.model_copy(update={"probability": 0.9982}) for cause in result.diagnosis.causes]
+    part = result.diagnosis.model_copy(update={"table": rows, "causes": sure})
+    shown = diagnosis_view(result.model_copy(update={"diagnosis": part}), WORDS, SETTINGS)
+    assert shown.rows[-1][0] == "bearing friction" and "wrong sign" in shown.rows[-1]
+    assert "(probability > 99 %)" in shown.named[0].line
+
+
+def test_columns_without_any_number_are_left_out(failed_result, full_result):
+    """Of a specimen that was not measured nothing was simulated, and no photo has a length."""
+    steps = [step.model_copy(update={"force_fit_N": None}) for step in full_result.steps]
+    refused = [
+        photo.model_copy(update={"chord_m": None, "traced_length_m": None, "width_m": None, "s_m": []})
+        for photo in failed_result.photos
+    ]
+    text = report_html(failed_result.model_copy(update={"steps": steps, "photos": refused}))
+    assert "Forces, measured</h3>" in text.replace("\n", "") and "simulated [" not in text
+    assert all(head in report_html(full_result) for head in ("traced length", "simulated ["))
 
 
 def test_nothing_is_concluded_from_numbers_that_are_not_usable(diagnosed):

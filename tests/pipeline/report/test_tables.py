@@ -67,10 +67,15 @@ def test_extended_model_answers_in_every_table(diagnosed, written):
     assert rows[-1][1] == unit.number(*extended.at(extended.kappa[-1]))
 
 
-def test_control_points_where_the_fit_is_the_answer(full_result):
-    words = Words("en")
-    assert len(knot_rows(full_result, words)) == len(full_result.inverse.knots)
-    assert "Points of the characteristic" in knot_title(full_result, words)
+def test_points_of_the_characteristic_have_the_band_of_the_answer(full_result):
+    """Where nothing is named the diagnosis widens the band, and the points of the fit itself know nothing of that."""
+    words, unit = Words("en"), stiffness_unit(full_result, Words("en"))
+    curve = full_result.inverse.curve
+    wider = curve.model_copy(update={"tangent_std_Nm2": [5.0 * std for std in curve.tangent_std_Nm2]})
+    result = full_result.model_copy(update={"inverse": full_result.inverse.model_copy(update={"curve": wider})})
+    rows, answer = knot_rows(result, words), result.answer.curve
+    assert rows[-1][1] == unit.number(answer.tangent[-1], answer.tangent_std[-1])
+    assert "Points of the characteristic" in knot_title(result, words)
 
 
 def test_failed_specimen_has_tables_with_heads_only(failed_result, tmp_path):
