@@ -39,7 +39,7 @@ def headline(
         return Message(f"diagnosis.{verdict}", seen=seen)
     if verdict == "unexplained":
         return Message("diagnosis.unexplained", left=left)
-    found = [{"names": map(word, part.class_), "size": (part.estimate, part.std, part.unit)} for part in causes]
+    found = [{"names": map(word, part.class_), "size": part.stated} for part in causes]
     effects = {
         "gain": "" if explained is None else Message("diagnosis.gain", share=min(explained, 1.0)),
         "shift": "" if change is None else Message("diagnosis.shift", change=change),

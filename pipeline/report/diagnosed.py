@@ -86,7 +86,8 @@ def _named(part: DiagnosisPart, words: Words) -> list[NamedCause]:
     """Name, probability, estimate and twins of a cause, and what to do; not of one that does not suffice."""
     named = []
     for cause in part.causes:
-        estimate = words.unit(cause.unit, cause.estimate).text(cause.estimate, cause.std)
+        size, std, unit = cause.stated
+        estimate = words.unit(unit, size).text(size, std)
         share = words("probability_of", share=_share(cause.probability, words))
         if part.verdict == "unexplained":  # a probability among causes of which none suffices says nothing
             share = words("does_not_suffice")

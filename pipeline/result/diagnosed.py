@@ -51,8 +51,16 @@ class CausePart(Part):
     estimate: Number = Field(description="its amount, in its unit")
     std: Number = Field(description="of the amount, in its unit")
     unit: str = Field(description="of the amount; - is a plain number")
+    size: tuple[Number, Number, str] | None = Field(
+        None, description="what its forms make up where that says more than the amount: value, std and unit"
+    )
     forms: list[CauseForm] = Field([], description="of the extended model; several may act together")
     twins: list[TwinPart] = Field([], description="other causes that leave no more than noise, whether likely or not")
+
+    @property
+    def stated(self) -> tuple[float, float, str]:
+        """What a reader is told of its size: value, standard deviation and unit."""
+        return self.size or (self.estimate, self.std, self.unit)
 
     def in_what_form(self, language: str) -> list[str]:
         """The forms that the cause has in the extended model, in words; with figures where these were fitted."""

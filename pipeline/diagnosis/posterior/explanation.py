@@ -64,12 +64,12 @@ class Explanation:
         whole = [k for k, form in enumerate(forms) if not np.isfinite(form.known)]
         return max((_total(np.eye(len(forms))[k], amounts, covariance) for k in whole), key=lambda pair: abs(pair[0]))
 
-    def size(self, cause: Cause) -> tuple[float, float, str]:
-        """Stated size of a cause, its standard deviation and unit: what its forms make up, else its amount."""
+    def size(self, cause: Cause) -> tuple[float, float, str] | None:
+        """What the forms of a cause make up where that says more than its amount: size, standard deviation, unit."""
         forms, amounts, covariance = self._forms(cause)
         made = cause.together(forms, self.fitted.extension.facts)
         if made is None:
-            return *self.amount(cause), cause.unit
+            return None
         unit, rows = made
         return *_total(largest(rows, amounts, covariance), amounts, covariance), unit
 

@@ -47,16 +47,17 @@ def _classes(bench: Workbench, conclusion: Conclusion) -> list[CausePart]:
     parts = []
     for cause, names in zip(accepted.causes, conclusion.classes, strict=True):
         kind = catalogue[cause]
-        size, std, unit = accepted.size(kind)
+        amount, std = accepted.amount(kind)
         parts.append(
             CausePart(
                 name=kind.name,
                 # a name that was found itself cannot stand in the place of another
                 **{"class": [catalogue[k].name for k in names if k == cause or k not in accepted.causes]},
                 probability=conclusion.posterior.of(cause),
-                estimate=size,
+                estimate=amount,
                 std=std,
-                unit=unit,
+                unit=kind.unit,
+                size=accepted.size(kind),
                 twins=[twin for twin in twins if twin.name != kind.name],
             )
         )

@@ -117,8 +117,9 @@ def test_a_zero_of_the_load_cell_that_wanders(protocol, seed):
     part, _, _ = diagnose(faults_of_input(replace(test, steps=tuple(steps))), None)
     assert part.verdict == "named" and part.causes[0].name == "force_drift", part.headline
     went = max((float(zero(time)) for step in steps for time in step.hold_times[[0, -1]]), key=abs)
-    size = part.causes[0]  # how far the zero went
-    assert size.unit == "N" and size.estimate == pytest.approx(went, abs=3.0 * size.std) and size.std < 0.3 * abs(went)
+    size, std, unit = part.causes[0].stated  # how far the zero went
+    assert unit == "N" and size == pytest.approx(went, abs=3.0 * std) and std < 0.3 * abs(went)
+    assert part.causes[0].unit == "N/s"
     K, f, std = (np.array(getattr(part.extended, of)) for of in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2"))
     assert np.mean(np.abs(f - cable.law(K - cable.K0)[1]) <= 1.96 * std) > 0.9 and np.median(std / f) < 0.05
 
