@@ -41,7 +41,7 @@ def _begun(bench: Workbench, fitted: Fit) -> Message | None:
     for k, term in enumerate(fitted.extension.terms):
         if term.cause in BEGUN:
             step, (amount, std) = bench.test.steps[int(term.variant.at)], fitted.amount(k)
-            more = Message("left.growing") if term.variant.width else ""
+            more = Message("begun.growing") if term.variant.width else ""
             size = (amount, std, term.cause.unit)
-            return Message(f"left.{term.cause.name}", step=step.step, branch=step.branch, size=size, more=more)
+            return Message(term.cause.name, step=step.step, branch=step.branch, size=size, more=more)
     return None

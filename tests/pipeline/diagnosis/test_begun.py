@@ -36,7 +36,7 @@ def test_a_cable_that_rolls_about_its_axis(protocol, seed):
     part, _, _ = diagnose(faults_of_input(test), None)
     assert part.verdict == "unexplained" and not part.causes, part.headline
     said = part.leftover.values
-    assert part.leftover.key == "left.begun.rest" and said["step"] == test.steps[4].step, part.headline
+    assert part.leftover.key == "begun.rest" and said["step"] == test.steps[4].step, part.headline
     size, std, _ = said["size"]
     assert size == pytest.approx(-0.2, abs=4.0 * std) and std < 0.02
     K, f, band = (np.array(getattr(part.extended, of)) for of in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2"))
@@ -50,6 +50,6 @@ def test_a_cable_that_becomes_stiffer_all_at_once(seed):
     cable = Cable()
     test = changed(cable, replace(cable, EI0=1.025 * cable.EI0, EI1=1.025 * cable.EI1), "six", 4, seed=seed)
     part, _, _ = diagnose(faults_of_input(test), None)
-    assert part.verdict == "unexplained" and part.leftover.key == "left.begun.stiffness", part.headline
+    assert part.verdict == "unexplained" and part.leftover.key == "begun.stiffness", part.headline
     size, std, _ = part.leftover.values["size"]
     assert size == pytest.approx(0.025, abs=4.0 * std) and part.leftover.values["step"] == test.steps[4].step
