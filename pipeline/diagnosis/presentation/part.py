@@ -154,8 +154,9 @@ def what_next(
     if conclusion.accepted is not None and conclusion.rivals and not unexplained:
         return next_experiment(bench, conclusion.accepted, conclusion.rivals, settings)
     if unexplained:
-        turn = Message("next.turn" if bench.facts.returns else "next.turn-unload")
-        return NextExperiment(**NextExperiment.told(turn), separates=[])
+        chance = conclusion.accepted is not None and conclusion.accepted.begun  # what began may not begin there again
+        look = "next.repeat" if chance else "next.turn" if bench.facts.returns else "next.turn-unload"
+        return NextExperiment(**NextExperiment.told(Message(look)), separates=[])
     if not bench.facts.returns:
         hidden = ["bearing_friction", "hysteresis", "plastic_set"]
         return NextExperiment(**NextExperiment.told(Message("next.unload")), separates=hidden)

@@ -37,6 +37,7 @@ def test_a_cable_that_rolls_about_its_axis(protocol, seed):
     assert part.verdict == "unexplained" and not part.causes, part.headline
     said = part.leftover.values
     assert part.leftover.key == "begun.rest" and said["step"] == test.steps[4].step, part.headline
+    assert part.next_experiment.what == "repeat the same test"
     size, std, _ = said["size"]
     assert size == pytest.approx(-0.2, abs=4.0 * std) and std < 0.02
     K, f, band = (np.array(getattr(part.extended, of)) for of in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2"))
