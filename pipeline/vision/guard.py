@@ -44,8 +44,8 @@ def guarded(image: str, work: Callable[[], Found]) -> Found | Rejected:
 def jointly(
     names: Sequence[str],
     outcomes: Sequence[Outcome | Rejected],
-    work: Callable[[tuple[Outcome | Rejected, ...]], Found],
-) -> tuple[tuple[Outcome | Rejected, ...], Found | None]:
+    work: Callable[[Sequence[Outcome | Rejected]], Found],
+) -> Found | Rejected:
     """Work on all photos of a series together; where it breaks, without the first photo whose absence heals it.
 
     Parameters
@@ -59,20 +59,17 @@ def jointly(
 
     Returns
     -------
-    tuple of object or Rejected
-        The outcomes the work was done on: as given, or with the photo to blame rejected.
-    object or None
-        What the work found; None if it breaks whichever photo is left out.
+    object or Rejected
+        What the work found; why it breaks if it does whichever photo is left out.
     """
-    given = tuple(outcomes)
-    whole = guarded("", partial(work, given))
+    whole = guarded("", partial(work, outcomes))
     if not isinstance(whole, Rejected):
-        return given, whole
+        return whole
     for k, name in enumerate(names):
-        if isinstance(given[k], Rejected):
+        if isinstance(outcomes[k], Rejected):
             continue
-        without = (*given[:k], Rejected(name, whole.said), *given[k + 1 :])
+        without = (*outcomes[:k], Rejected(name, whole.said), *outcomes[k + 1 :])
         found = guarded("", partial(work, without))
         if not isinstance(found, Rejected):
-            return without, found
-    return given, None
+            return found
+    return whole

@@ -8,10 +8,9 @@ A photo that cannot be measured is a `pipeline.records.Rejected` in its place; t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -32,7 +31,7 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.covers import VERTICAL_DEG
 from pipeline.vision.bearings.steady import at_least, wandering_px
-from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_by_others
+from pipeline.vision.centerline.axes_of_series import told_by_others
 from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import Followed, follow_cable, waves_of
 from pipeline.vision.centerline.side import on_one_side
@@ -54,9 +53,8 @@ from pipeline.vision.single import shown
 from pipeline.vision.stated_width import with_width_seen
 
 Line = Centerline | Rejected
-Told = TypeVar("Told")
 
-_UNTOLD = doubtful("photo/program-error.series")
+_NO_SCALE = Scale(1.0, 1.0, Message("scale.none"))
 _MIN_TRAVEL_M = 2e-4  # m; below it rounding of the log and play of the bearings hide which bearing moves
 
 
@@ -85,91 +83,57 @@ def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
 def _traces(specimen: Specimen, settings: VisionSettings, known: Sequence[Calibration] = ()) -> Traces:
     """All photos with the diameter as stated, by a calibration that is known or the given one."""
     planes = list(known) or given_calibration(specimen, settings)
+    shots, covers = find_cables(specimen, next(iter(planes), None), settings)
+
+    def together(outcomes: Sequence[RoughCable | Rejected]) -> Traces:
+        some = [replace(shot, found=found) for shot, found in zip(shots, outcomes, strict=True)]
+        return _measured(specimen, some, planes, settings)
+
+    names = [shot.found.image for shot in shots]
+    traces = jointly(names, [shot.found for shot in shots], together)
+    if isinstance(traces, Rejected):
+        traces = Traces(tuple(Rejected(name, traces.said) for name in names), _NO_SCALE)
+    pairs = zip(shots, traces.photos, strict=True)
+    photos = tuple(replace(photo, preview=shot.preview) if photo.preview is None else photo for shot, photo in pairs)
+    return replace(traces, photos=photos, findings=tuple(dict.fromkeys((*covers, *traces.findings))))
+
+
+def _measured(specimen: Specimen, shots: list[Shot], planes: list[Calibration], settings: VisionSettings) -> Traces:
+    """The cables found on all photos measured together; ``planes`` are those of the calibration given."""
+    shots, size_findings = of_one_size(shots)
     calibration = next(iter(planes), None)
-    shots, cover_findings = find_cables(specimen, calibration, settings)
-    shots, sized = _together(shots, lambda some: of_one_size(some))
-    shots, size_findings = sized or (shots, (_UNTOLD,))
     if calibration is None or len(planes) > 1:
-        shots, told = _together(shots, lambda some: (_by_what_is_seen(specimen, some, planes, settings),))
-        calibration = _by_what_is_seen(specimen, shots, planes, settings) if told is None else told[0]
+        calibration = _by_what_is_seen(specimen, shots, planes, settings)
         if calibration is not None and planes and calibration.plane is not planes[0].plane:
             return _traces(specimen, settings, [calibration])  # where axes that a person gave move to, hangs on it
     if calibration is None:
-        photos = tuple(replace(shot.found, preview=shot.preview) for shot in shots if isinstance(shot.found, Rejected))
-        return Traces(photos, Scale(1.0, 1.0, Message("scale.none")))
-    shots, settled = _together(shots, lambda some: with_fixed_cover(specimen, some, calibration, settings))
-    shots = shots if settled is None else settled
-    found, _ = _told_by(shots, [shot.found for shot in shots])
-    parallax_std = axis_parallax_std(specimen, found, settings.calibration)
-    shots, lines, side_findings = _measure_all(specimen, shots, calibration, parallax_std, settings)
-    pairs = list(zip(shots, lines, strict=True))
-    lines = tuple(_without_hidden_ends(shot.found, line, specimen, calibration, settings) for shot, line in pairs)
-    lines, bow_findings = _alike(shots, lines, specimen)
+        return Traces(tuple(shot.found for shot in shots if isinstance(shot.found, Rejected)), _NO_SCALE)
+    shots = with_fixed_cover(specimen, shots, calibration, settings)
+    parallax_std = axis_parallax_std(specimen, _told_by(shots)[0], settings.calibration)
+    shots, cables, side_findings = _followed(specimen, shots, calibration, parallax_std, settings)
+    measured = [
+        _without_hidden_ends(shot.found, line, specimen, calibration, settings)
+        for shot, line in zip(shots, _tied(shots, cables, settings), strict=True)
+    ]
+    lines, bow_findings = on_one_side(tuple(measured), specimen.diameter_m)
     lines = tuple(_doubted(line, calibration) for line in lines)
-    lines, check_findings = _checked(specimen, shots, lines, calibration, settings)
-    untold = () if settled is not None else (_UNTOLD,)
-    findings = (*cover_findings, *size_findings, *untold, *side_findings, *bow_findings, *check_findings)
-    findings = (*calibration.findings, *dict.fromkeys(findings))
-    return Traces(_with_pictures(shots, lines), calibration.scale, findings, parallax_std)
-
-
-def _together(shots: list[Shot], work: Callable[[list[Shot]], Told]) -> tuple[list[Shot], Told | None]:
-    """Work on all photos together; the one on which it breaks is refused. None where that heals nothing."""
-
-    def without(outcomes: Sequence[RoughCable | Rejected]) -> list[Shot]:
-        return [replace(shot, found=found) for shot, found in zip(shots, outcomes, strict=True)]
-
-    names, given = [shot.found.image for shot in shots], [shot.found for shot in shots]
-    outcomes, told = jointly(names, given, lambda some: work(without(some)))
-    return without(outcomes), told
+    found, displacements = _told_by(shots, lines)
+    findings = (
+        *(*calibration.findings, *size_findings, *side_findings, *bow_findings),
+        *check_scale(specimen, calibration, found, displacements, settings.calibration),
+        *_check_lengths(specimen, lines, settings.series),
+    )
+    return Traces(lines, calibration.scale, findings, parallax_std)
 
 
 def _by_what_is_seen(
     specimen: Specimen, shots: list[Shot], planes: list[Calibration], settings: VisionSettings
 ) -> Calibration | None:
     """The calibration by bearings and cable, or which of the planes of a board is theirs."""
-    found, displacements = _told_by(shots, [shot.found for shot in shots])
+    found, displacements = _told_by(shots)
     if planes:
         return in_plane_of_cable(planes, specimen, found, displacements, settings.calibration)
     return from_found(specimen, found, displacements, settings.calibration)
-
-
-def _alike(
-    shots: Sequence[Shot], lines: tuple[Line, ...], specimen: Specimen
-) -> tuple[tuple[Line, ...], tuple[Finding, ...]]:
-    """Centerlines with one positive side; a photo that breaks it is refused.
-
-    Lines that break it whichever of them is left out stay as they are, and a finding says so.
-    """
-    side = partial(on_one_side, diameter_m=specimen.diameter_m)
-    lines, turned = jointly([shot.found.image for shot in shots], lines, side)
-    return (lines, (_UNTOLD,)) if turned is None else turned
-
-
-def _checked(
-    specimen: Specimen,
-    shots: Sequence[Shot],
-    lines: tuple[Line, ...],
-    calibration: Calibration,
-    settings: VisionSettings,
-) -> tuple[tuple[Line, ...], tuple[Finding, ...]]:
-    """Scale and lengths of all photos held against what else is known; a photo that breaks that is refused."""
-
-    def check(some: tuple[Line, ...]) -> tuple[Finding, ...]:
-        found, displacements = _told_by(shots, some)
-        return (
-            *check_scale(specimen, calibration, found, displacements, settings.calibration),
-            *_check_lengths(specimen, some, settings.series),
-        )
-
-    lines, findings = jointly([shot.found.image for shot in shots], lines, check)
-    return lines, (_UNTOLD,) if findings is None else findings
-
-
-def _with_pictures(shots: Sequence[Shot], lines: tuple[Line, ...]) -> tuple[Line, ...]:
-    """The picture is shown also where the work on it broke."""
-    pairs = zip(shots, lines, strict=True)
-    return tuple(replace(line, preview=shot.preview) if line.preview is None else line for shot, line in pairs)
 
 
 def given_calibration(specimen: Specimen, settings: VisionSettings) -> list[Calibration]:
@@ -183,19 +147,19 @@ def given_calibration(specimen: Specimen, settings: VisionSettings) -> list[Cali
 
 
 def _told_by(
-    shots: Sequence[Shot], outcomes: Sequence[RoughCable | Followed | Centerline | Rejected]
+    shots: Sequence[Shot], outcomes: Sequence[Followed | Line] | None = None
 ) -> tuple[list[RoughCable], Array]:
     """Cables and displacements of the photos that were not refused: what was may show something else."""
-    pairs = zip(shots, outcomes, strict=True)
+    pairs = zip(shots, [shot.found for shot in shots] if outcomes is None else outcomes, strict=True)
     kept = [(shot.found, shot.step) for shot, outcome in pairs if not isinstance(outcome, Rejected)]
     found = [cable for cable, _ in kept if isinstance(cable, RoughCable)]
     return found, np.array([step.displacement_m for _, step in kept])
 
 
-def _measure_all(
+def _followed(
     specimen: Specimen, shots: list[Shot], calibration: Calibration, parallax_std: float, settings: VisionSettings
-) -> tuple[list[Shot], tuple[Centerline | Rejected, ...], tuple[Finding, ...]]:
-    """Measure all photos: the cables that can be followed tell the sides and the axes of all."""
+) -> tuple[list[Shot], Sequence[Followed | Rejected], tuple[Finding, ...]]:
+    """The cables followed on all photos, without their common lay; those that can be tell the sides of all."""
 
     def follow(found: RoughCable | Rejected) -> Followed | Rejected:
         if isinstance(found, Rejected):
@@ -204,26 +168,19 @@ def _measure_all(
         work = partial(follow_cable, found, plane=plane, diameter_m=diameter, axis_parallax_std=parallax_std)
         return guarded(found.image, work)
 
-    def sides(cables: Sequence[Followed | Rejected]) -> tuple[bool, tuple[Finding, ...], float]:
-        found, _ = _told_by(shots, cables)
-        turned, findings = _name_sides(specimen, found, calibration)
-        fixed, wandering, shift = wandering_px(found, settings.series.max_fixed_shift_m * calibration.scale.px_per_m)
-        if wandering > 0.0:
-            moved = doubtful("photo/camera-moved", side=fixed, shift_m=shift / calibration.scale.px_per_m)
-            findings = (*findings, moved)
-        return turned, findings, wandering
-
-    cables, told = jointly([shot.found.image for shot in shots], [follow(shot.found) for shot in shots], sides)
-    turned, findings, wandering = told or (False, (_UNTOLD,), 0.0)
+    cables = [follow(shot.found) for shot in shots]
+    found, _ = _told_by(shots, cables)
+    turned, findings = _name_sides(specimen, found, calibration)
+    fixed, wandering, shift = wandering_px(found, settings.series.max_fixed_shift_m * calibration.scale.px_per_m)
     if turned:
         shots = [replace(shot, found=_reversed(shot.found)) for shot in shots]
         pairs = zip(shots, cables, strict=True)
-        cables = tuple(c if isinstance(c, Rejected) else follow(shot.found) for shot, c in pairs)
+        cables = [cable if isinstance(cable, Rejected) else follow(shot.found) for shot, cable in pairs]
     if wandering > 0.0:
-        cables = tuple(c if isinstance(c, Rejected) else _loosened(c, wandering) for c in cables)
-    lay = partial(without_lay, diameter_m=specimen.diameter_m)
-    cables, even = jointly([shot.found.image for shot in shots], cables, lay)
-    return shots, _tied(shots, even or cables, settings), findings if even else (*findings, _UNTOLD)
+        moved = doubtful("photo/camera-moved", side=fixed, shift_m=shift / calibration.scale.px_per_m)
+        findings = (*findings, moved)
+        cables = [cable if isinstance(cable, Rejected) else _loosened(cable, wandering) for cable in cables]
+    return shots, without_lay(cables, specimen.diameter_m), findings
 
 
 def _loosened(cable: Followed, std_px: float) -> Followed:
@@ -233,25 +190,16 @@ def _loosened(cable: Followed, std_px: float) -> Followed:
     return replace(cable, rough=rough, chord=chord)
 
 
-def _tied(
-    shots: list[Shot], cables: Sequence[Followed | Rejected], settings: VisionSettings
-) -> tuple[Centerline | Rejected, ...]:
+def _tied(shots: list[Shot], cables: Sequence[Followed | Rejected], settings: VisionSettings) -> list[Line]:
     """Centerlines of the cables, each tied to its axes by what the others tell of how a cable passes them."""
-    sights = [cable if isinstance(cable, Rejected) else guarded(cable.rough.image, cable.sight) for cable in cables]
-    images = [shot.found.image for shot in shots]
-    # a photo on which that breaks is measured by itself
-    _, told = jointly(images, sights, _told)
-    _, waves = jointly(images, cables, partial(waves_of))
-    return tuple(
-        guarded(shot.found.image, partial(shown, cable, shot.preview, settings, axes, waves))
-        for shot, cable, axes in zip(shots, cables, told or [None] * len(shots), strict=True)
-    )
-
-
-def _told(sights: Sequence[AxisSight | Rejected | None]) -> list[AxesTold | None]:
-    """What the other photos tell of each that was not refused."""
-    told = iter(told_by_others([sight for sight in sights if isinstance(sight, AxisSight)]))
-    return [next(told) if isinstance(sight, AxisSight) else None for sight in sights]
+    sights = [None if isinstance(cable, Rejected) else cable.sight() for cable in cables]
+    told = iter(told_by_others([sight for sight in sights if sight is not None]))
+    axes = [None if sight is None else next(told) for sight in sights]
+    waves = waves_of(cables)
+    return [
+        guarded(shot.found.image, partial(shown, cable, shot.preview, settings, by_others, waves))
+        for shot, cable, by_others in zip(shots, cables, axes, strict=True)
+    ]
 
 
 def _doubted(line: Centerline | Rejected, calibration: Calibration) -> Centerline | Rejected:
