@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -47,15 +47,100 @@ class Shot:
     size: tuple[int, int] | None = None
 
 
+@dataclass(frozen=True)
+class _Search:
+    """The search on the photos of a specimen.
+
+    Attributes
+    ----------
+    specimen : Specimen
+    settings : VisionSettings
+    calibration : Calibration or None
+    cover_px : px or None
+        Diameter of covers that were seen where nobody gave it.
+    """
+
+    specimen: Specimen
+    settings: VisionSettings
+    calibration: Calibration | None
+    cover_px: float | None = None
+
+    @cached_property
+    def steps(self) -> list[LoadStep]:
+        """Steps whose photos exist."""
+        return [step for step in self.specimen.steps if step.image in self.specimen.images]
+
+    def load(self, step: LoadStep) -> Photo | Rejected:
+        """The photo of a step."""
+        name = str(step.image)
+        return guarded(name, partial(load_photo, self.specimen.images[name], self.settings.photo, name=name))
+
+    def find_as(self, photo: Photo, cable: Cable, near: RoughCable | None = None) -> RoughCable | Rejected:
+        """The cable of which something is known."""
+        hints = self.specimen.hints.get(photo.name)
+        return guarded(photo.name, partial(find_cable, photo, cable=cable, near=near, hints=hints))
+
+    def find(self, photo: Photo, step: LoadStep, near: Shot | None) -> RoughCable | Rejected:
+        """The cable by what specimen, scale and a neighbour photo tell."""
+        cable = self._expected(step.displacement_m - self.steps[0].displacement_m)
+        if near is None or isinstance(near.found, Rejected):
+            return self.find_as(photo, cable)
+        plane = None if self.calibration is None else self.calibration.plane
+        travel = step.displacement_m - near.step.displacement_m
+        seen = expected_covers(near.found, self.specimen.rig.moving_bearing, travel, plane)
+        return self.find_as(photo, replace(cable, bearings=replace(cable.bearings, seen=seen)), near.found)
+
+    def find_all(self) -> list[Shot]:
+        """All photos, each searched near where the cable was on the one before."""
+        shots: list[Shot] = []
+        near: Shot | None = None
+        for step in self.steps:
+            photo = self.load(step)
+            if isinstance(photo, Rejected):
+                shots.append(Shot(step, photo, None))
+                continue
+            found = self.find(photo, step, near)
+            shown = guarded(photo.name, partial(reduce_photo, photo, self.settings.preview))
+            shots.append(Shot(step, found, None if isinstance(shown, Rejected) else shown, photo.size))
+            near = shots[-1] if isinstance(found, RoughCable) else near
+        return shots
+
+    def _expected(self, travel: float) -> Cable:
+        """What is known of the cable on a photo taken ``travel`` (m) of the moving bearing after the first photo."""
+        specimen, rig = self.specimen, self.specimen.rig
+        covered = rig.marker_diameter_m is not None
+        if self.calibration is None:
+            # Without a scale the travel in px is unknown: the user's axes hold for the first photo only.
+            given = rig.bearings_px if travel == 0.0 and not covered else None
+            widths = None if rig.marker_diameter_m is None else rig.marker_diameter_m / specimen.diameter_m
+            cable = Cable(bearings=BearingHints(cover_widths=widths, given_px=given))
+            cable = replace(cable, slenderness=specimen.length_m / specimen.diameter_m)
+        else:
+            scale, given = self.calibration.scale.px_per_m, None
+            if rig.bearings_px is not None and not covered:
+                given = moved_axes(rig.bearings_px, rig.moving_bearing, travel, self.calibration.plane)
+            cover = None if rig.marker_diameter_m is None else rig.marker_diameter_m * scale
+            hints = BearingHints(cover_px=cover, given_px=given)
+            cable = Cable(specimen.diameter_m * scale, specimen.length_m * scale, hints)
+        return cable if self.cover_px is None else replace(cable, bearings=BearingHints(cover_px=self.cover_px))
+
+
 def find_cables(
     specimen: Specimen, calibration: Calibration | None, settings: VisionSettings
 ) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
-    if calibration is None and specimen.rig.bearings_px is not None and specimen.rig.marker_diameter_m is None:
-        calibration = _scale_between_given_axes(specimen, settings)
-    shots = _once_more(specimen, calibration, _find_all(specimen, calibration, settings), settings)
+    rig = specimen.rig
+    search = _Search(specimen, settings, calibration)
+    if calibration is None and rig.bearings_px is not None and rig.marker_diameter_m is None:
+        # The cable's length on the first photo, for which the axes are given, tells where they go from there.
+        first = search.load(search.steps[0])
+        cable = first if isinstance(first, Rejected) else search.find(first, search.steps[0], None)
+        if isinstance(cable, RoughCable):
+            known = from_number(cable.length_px / specimen.length_m, settings.calibration)
+            search = replace(search, calibration=known)
+    shots = _once_more(search, search.find_all())
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
-    if specimen.rig.marker_diameter_m is not None or specimen.rig.bearings_px is not None or not found:
+    if rig.marker_diameter_m is not None or rig.bearings_px is not None or not found:
         return shots, ()
     most = settings.series.max_length_deviation
     if calibration is not None:
@@ -64,24 +149,12 @@ def find_cables(
         if _count_alike(found, most, stated) == len(found):
             return shots, ()
     ends = [found[0], found[-1]] if len(found) > 1 else found
-    radius = guarded("", lambda: cover_radius(_with_photos(specimen, ends, settings)))
-    radius = None if isinstance(radius, Rejected) else radius  # where the search breaks on a photo, it tells none
-    again = [] if radius is None else _find_all(specimen, calibration, settings, cover_px=2.0 * radius)
-    if radius is None or _count_alike(again, most) < _count_alike(shots, most):
-        return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
-    return again, (inferred("rig/covers-found", diameter_px=2.0 * radius),)
-
-
-def _scale_between_given_axes(specimen: Specimen, settings: VisionSettings) -> Calibration | None:
-    """The scale by the cable's length on the first photo, for which axes are given: it tells where they go from there.
-
-    None where no cable is found on it.
-    """
-    first = next(step for step in specimen.steps if step.image in specimen.images)
-    found = _find_all(replace(specimen, steps=(first,)), None, settings)[0].found
-    if isinstance(found, Rejected):
-        return None
-    return from_number(found.length_px / specimen.length_m, settings.calibration)
+    radius = guarded("", lambda: cover_radius(_with_photos(search, ends)))
+    if radius is not None and not isinstance(radius, Rejected):  # where the search breaks on a photo, it tells none
+        again = replace(search, cover_px=2.0 * radius).find_all()
+        if _count_alike(again, most) >= _count_alike(shots, most):
+            return again, (inferred("rig/covers-found", diameter_px=2.0 * radius),)
+    return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
 
 
 def _count_alike(shots: list[Shot], most: float, length_px: float | None = None) -> int:
@@ -91,9 +164,7 @@ def _count_alike(shots: list[Shot], most: float, length_px: float | None = None)
     return 0 if usual is None else int(np.count_nonzero(np.abs(lengths / usual - 1.0) <= most))
 
 
-def _once_more(
-    specimen: Specimen, calibration: Calibration | None, shots: list[Shot], settings: VisionSettings
-) -> list[Shot]:
+def _once_more(search: _Search, shots: list[Shot]) -> list[Shot]:
     """Photos on which no cable was found: searched again with what the others tell that they were not told.
 
     Those before the first cable had no neighbour. Without a scale the covers are expected in widths of the cable, and
@@ -103,72 +174,27 @@ def _once_more(
     there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
     if not there:
         return shots
-    known = _scale_of_covers(specimen, shots, settings) if calibration is None else calibration
-    last = there[0] if known is calibration else len(shots)  # none before it had a neighbour, all after it had one
-    first = shots[0].step.displacement_m  # axes that are given hold for the first photo
-    return [
-        replace(
-            shot, found=_find_as_on(specimen, shot, shots[min(there, key=lambda i: abs(i - k))], known, settings, first)
-        )
-        if isinstance(shot.found, Rejected) and shot.preview is not None and k < last
-        else shot
-        for k, shot in enumerate(shots)
-    ]
+    last = there[0]  # all after it had a neighbour
+    if search.calibration is None:
+        search = replace(search, calibration=_scale_of_covers(search, shots))
+        last = last if search.calibration is None else len(shots)
+    settled = list(shots)
+    for k, shot in enumerate(shots[:last]):
+        photo = search.load(shot.step) if isinstance(shot.found, Rejected) and shot.preview is not None else None
+        if isinstance(photo, Photo):
+            again = search.find(photo, shot.step, shots[min(there, key=lambda i: abs(i - k))])
+            settled[k] = replace(shot, found=again) if isinstance(again, RoughCable) else shot
+    return settled
 
 
-def _scale_of_covers(specimen: Specimen, shots: list[Shot], settings: VisionSettings) -> Calibration | None:
+def _scale_of_covers(search: _Search, shots: list[Shot]) -> Calibration | None:
     """The scale by covers that are seen all round and alike on all photos; None if there are none, or of no size."""
     sure = [s.found for s in shots if isinstance(s.found, RoughCable) and s.found.left.sure and s.found.right.sure]
     radii = [axis.radius_px for cable in sure for axis in (cable.left, cable.right) if axis.radius_px is not None]
-    diameter = specimen.rig.marker_diameter_m
+    diameter = search.specimen.rig.marker_diameter_m
     if diameter is None or not radii or np.ptp(radii) > 2.0 * SAME_RADIUS * np.median(radii):
         return None
-    return from_number(2.0 * float(np.median(radii)) / diameter, settings.calibration)
-
-
-def _find_as_on(
-    specimen: Specimen,
-    shot: Shot,
-    near: Shot,
-    calibration: Calibration | None,
-    settings: VisionSettings,
-    first: float,
-) -> RoughCable | Rejected:
-    """The cable on a photo once more, with a neighbour photo known; else why it was refused before.
-
-    ``first`` (m) is the displacement of the first photo.
-    """
-    if isinstance(near.found, Rejected):
-        return shot.found
-    cable = _expected(specimen, calibration, shot.step.displacement_m - first)
-    cable = _near(specimen, cable, near.found, shot.step.displacement_m - near.step.displacement_m, calibration)
-    again = _find_again(specimen, shot, cable, settings, near=near.found)
-    return again if isinstance(again, RoughCable) else shot.found
-
-
-def _near(specimen: Specimen, cable: Cable, near: RoughCable, travel: float, calibration: Calibration | None) -> Cable:
-    """What is known of the cable, with the covers that a neighbour photo, ``travel`` (m) before, lets expect."""
-    plane = None if calibration is None else calibration.plane
-    seen = expected_covers(near, specimen.rig.moving_bearing, travel, plane)
-    return replace(cable, bearings=replace(cable.bearings, seen=seen))
-
-
-def _find_again(
-    specimen: Specimen, shot: Shot, cable: Cable, settings: VisionSettings, *, near: RoughCable | None = None
-) -> RoughCable | Rejected:
-    """The cable on a photo that was searched before."""
-    photo = _loaded(specimen, shot.step, settings)
-    return photo if isinstance(photo, Rejected) else _find(specimen, photo, cable, near)
-
-
-def _loaded(specimen: Specimen, step: LoadStep, settings: VisionSettings) -> Photo | Rejected:
-    name = str(step.image)
-    return guarded(name, partial(load_photo, specimen.images[name], settings.photo, name=name))
-
-
-def _find(specimen: Specimen, photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
-    hints = specimen.hints.get(photo.name)
-    return guarded(photo.name, partial(find_cable, photo, cable=cable, near=near, hints=hints))
+    return from_number(2.0 * float(np.median(radii)) / diameter, search.settings.calibration)
 
 
 def _with_axes_shown(shot: Shot) -> Shot:
@@ -183,58 +209,12 @@ def _with_axes_shown(shot: Shot) -> Shot:
     return replace(shot, found=Rejected(cable.image, Message("photo/bearing.vanishes", u_px=u, v_px=v)))
 
 
-def _with_photos(specimen: Specimen, shots: list[Shot], settings: VisionSettings) -> Iterator[tuple[Photo, RoughCable]]:
+def _with_photos(search: _Search, shots: list[Shot]) -> Iterator[tuple[Photo, RoughCable]]:
     """The photos once more: they are not kept, a series of them would not fit into memory."""
     for shot in shots:
-        photo = _loaded(specimen, shot.step, settings)
+        photo = search.load(shot.step)
         if isinstance(photo, Photo) and isinstance(shot.found, RoughCable):
             yield photo, shot.found
-
-
-def _find_all(
-    specimen: Specimen, calibration: Calibration | None, settings: VisionSettings, *, cover_px: float | None = None
-) -> list[Shot]:
-    """Find the cable on all photos; ``cover_px`` is the diameter of covers seen on them (px)."""
-    shots: list[Shot] = []
-    near: RoughCable | None = None
-    first: LoadStep | None = None
-    last = specimen.steps[0]
-    for step in specimen.steps:
-        if step.image is None or step.image not in specimen.images:
-            continue
-        first = step if first is None else first
-        photo = _loaded(specimen, step, settings)
-        if isinstance(photo, Rejected):
-            shots.append(Shot(step, photo, None))
-            continue
-        cable = _expected(specimen, calibration, step.displacement_m - first.displacement_m)
-        if cover_px is not None:
-            cable = replace(cable, bearings=BearingHints(cover_px=cover_px))
-        if near is not None:
-            cable = _near(specimen, cable, near, step.displacement_m - last.displacement_m, calibration)
-        found = _find(specimen, photo, cable, near)
-        if isinstance(found, RoughCable):
-            near, last = found, step
-        shown = guarded(photo.name, partial(reduce_photo, photo, settings.preview))
-        shots.append(Shot(step, found, None if isinstance(shown, Rejected) else shown, photo.size))
-    return shots
-
-
-def _expected(specimen: Specimen, calibration: Calibration | None, travel: float) -> Cable:
-    """What is known of the cable on a photo taken ``travel`` (m) of the moving bearing after the first photo."""
-    rig = specimen.rig
-    if calibration is None:
-        widths = None if rig.marker_diameter_m is None else rig.marker_diameter_m / specimen.diameter_m
-        # Without a scale the travel in px is unknown: the user's axes hold for the first photo only.
-        given = rig.bearings_px if travel == 0.0 and widths is None else None
-        hints = BearingHints(cover_widths=widths, given_px=given)
-        return Cable(bearings=hints, slenderness=specimen.length_m / specimen.diameter_m)
-    scale = calibration.scale.px_per_m
-    cover = None if rig.marker_diameter_m is None else rig.marker_diameter_m * scale
-    given = None
-    if rig.bearings_px is not None and cover is None:
-        given = moved_axes(rig.bearings_px, rig.moving_bearing, travel, calibration.plane)
-    return Cable(specimen.diameter_m * scale, specimen.length_m * scale, BearingHints(cover_px=cover, given_px=given))
 
 
 def with_fixed_cover(
@@ -247,22 +227,22 @@ def with_fixed_cover(
     """
     there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
     found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
-    play = settings.series.max_fixed_shift_m * calibration.scale.px_per_m
+    scale = calibration.scale.px_per_m
+    play = settings.series.max_fixed_shift_m * scale
     fixed = fixed_cover(found, play)
     if fixed is None:
         return shots
-    scale = calibration.scale.px_per_m
     diameter = None if fixed.cover.radius_px is None else 2.0 * fixed.cover.radius_px
     hints = BearingHints(cover_px=diameter, seen=(fixed.cover,))
     expected = Cable(specimen.diameter_m * scale, specimen.length_m * scale, hints)
-    settled = list(shots)
+    search, settled = _Search(specimen, settings, calibration), list(shots)
     for k, cable in ((there[i], found[i]) for i in fixed.astray):
-        again = _find_again(specimen, shots[k], expected, settings)
+        photo = search.load(shots[k].step)
+        again = photo if isinstance(photo, Rejected) else search.find_as(photo, expected)
         if isinstance(again, RoughCable) and stands_still(again, fixed, play):
             settled[k] = replace(shots[k], found=again)
         elif not is_sure(cable, fixed.side):
-            apart = apart_px(cable, fixed) / scale
-            said = Message("photo/bearing.astray", side=fixed.side, apart_m=apart)
+            said = Message("photo/bearing.astray", side=fixed.side, apart_m=apart_px(cable, fixed) / scale)
             settled[k] = replace(shots[k], found=Rejected(cable.image, said))
         else:
             settled[k] = replace(shots[k], found=doubted(cable, fixed.side))
