@@ -98,7 +98,7 @@ INSIDE = {
     ],
     "pipeline.vision.scale": [("plane",), ("calibration", "corners", "plane_fit"), ("board",)],
     "pipeline.vision.search": [
-        ("flanks", "strips", "backdrop"),
+        ("strips", "backdrop"),
         ("crosscut",),
         ("closeup",),
         ("candidates",),

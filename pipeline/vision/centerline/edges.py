@@ -29,7 +29,7 @@ from pipeline.records import Array
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Float32, Pixels
 from pipeline.vision.median import median, medians
-from pipeline.vision.search.flanks import steepest
+from pipeline.vision.search.crosscut import steepest
 
 SEARCH_RADII = 0.35
 """Of the radius; how far from its expected place an edge is sought: a path misled by a shadow is off by less, the next

@@ -20,8 +20,7 @@ from pipeline.records import Array
 from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Image, Standout
-from pipeline.vision.search.crosscut import SMOOTHING_WIDTHS, path_normals, smooth_path, straighten
-from pipeline.vision.search.flanks import find_flanks
+from pipeline.vision.search.crosscut import SMOOTHING_WIDTHS, find_flanks, path_normals, smooth_path, straighten
 from pipeline.vision.search.strips import (
     MIN_PIECE_WIDTHS,
     THICK_WIDTHS,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from pipeline.vision.search.flanks import find_flanks
+from pipeline.vision.search.crosscut import find_flanks
 from pipeline.vision.search.strips import find_strips, thick_part
 
 
