@@ -71,17 +71,17 @@ class Evidence:
 
     @property
     def value(self) -> float:
-        """To rank strips of one photo: px of cable, each as sure as it is."""
+        """Rank among the strips of one photo: length in px times likeness to a cable."""
         return self.length * self.likeness
 
     @property
     def clear(self) -> bool:
-        """Nothing to be weighed: no other reading of the photo need be looked at."""
+        """True if this is so surely a cable that no other reading of the photo need be looked at."""
         return self.seen >= 0.9 and self.edges >= _FIRM and self.unsteady <= 1.0 and self.crossed is None
 
     @property
     def enough(self) -> bool:
-        """More for a cable than against it: its band may be wide, but it is the band of a cable."""
+        """True if more speaks for a cable than against it; how well it is known, its band says."""
         return self.likeness >= _LEAST_LIKENESS and self.edges >= _SURE
 
 

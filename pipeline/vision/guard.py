@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import TypeVar
 
@@ -46,7 +46,9 @@ def jointly(
     outcomes: Sequence[Outcome | Rejected],
     work: Callable[[Sequence[Outcome | Rejected]], Found],
 ) -> Found | Rejected:
-    """Work on all photos of a series together; where it breaks, without the first photo whose absence heals it.
+    """Work on all photos of a series together; where it breaks, without those that are to blame.
+
+    These are all on which it breaks without the others, or else the first one without which it does not.
 
     Parameters
     ----------
@@ -65,11 +67,15 @@ def jointly(
     whole = guarded("", partial(work, outcomes))
     if not isinstance(whole, Rejected):
         return whole
-    for k, name in enumerate(names):
-        if isinstance(outcomes[k], Rejected):
-            continue
-        without = (*outcomes[:k], Rejected(name, whole.said), *outcomes[k + 1 :])
-        found = guarded("", partial(work, without))
+    refused = [Rejected(name, whole.said) for name in names]
+    left = [k for k, outcome in enumerate(outcomes) if not isinstance(outcome, Rejected)]
+
+    def without(blamed: Collection[int]) -> Found | Rejected:
+        return guarded("", partial(work, [refused[k] if k in blamed else one for k, one in enumerate(outcomes)]))
+
+    alone = [k for k in left if isinstance(without({*left} - {k}), Rejected)]
+    for blamed in (alone if len(alone) < len(left) else [], *([k] for k in left)):
+        found = without(blamed) if blamed else whole
         if not isinstance(found, Rejected):
             return found
     return whole

@@ -9,7 +9,6 @@ Colour channels stay in the order of OpenCV (blue, green, red); values stay inte
 
 from __future__ import annotations
 
-import errno
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import ImageOps
 
-from pipeline.messages import Message
+from pipeline.messages import Message, by_system
 from pipeline.records import Rejected
 from pipeline.settings.vision.photo import PhotoSettings
 from pipeline.vision.photo_file import BROKEN, Header, is_sound, is_whole, opened, read_header
@@ -90,11 +89,11 @@ def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) 
     name = path.name if name is None else name
     try:
         if not stat.S_ISREG(path.stat().st_mode):  # opening a pipe would wait for whoever writes into it
-            raise OSError(errno.EINVAL, "it is no ordinary file")
+            return Rejected(name, Message("photo/missing.no-file"))
         # OpenCV opens paths in the system's code page on Windows; bytes work everywhere.
         data = path.read_bytes()
     except OSError as error:
-        return Rejected(name, Message("photo/missing.closed", why=error.strerror))
+        return Rejected(name, Message("photo/missing.closed", why=by_system(error)))
     return decode_photo(data, settings, name=name)
 
 

@@ -83,7 +83,7 @@ def find_cable(
 
 
 def _is_settled(found: RoughCable) -> bool:
-    """True of a strip that leaves nothing to be looked for: all speaks for it, and it is no piece of a longer one."""
+    """True of a strip that is surely the whole cable, so that no other reading is needed."""
     return found.evidence.clear and not found.goes_on
 
 

@@ -149,7 +149,7 @@ def given_calibration(specimen: Specimen, settings: VisionSettings) -> list[Cali
 def _told_by(
     shots: Sequence[Shot], outcomes: Sequence[Followed | Line] | None = None
 ) -> tuple[list[RoughCable], Array]:
-    """Cables and displacements of the photos that were not refused: what was may show something else."""
+    """Cables and displacements of the photos that were not refused."""
     pairs = zip(shots, [shot.found for shot in shots] if outcomes is None else outcomes, strict=True)
     kept = [(shot.found, shot.step) for shot, outcome in pairs if not isinstance(outcome, Rejected)]
     found = [cable for cable, _ in kept if isinstance(cable, RoughCable)]
@@ -184,14 +184,14 @@ def _followed(
 
 
 def _loosened(cable: Followed, std_px: float) -> Followed:
-    """The cable with axes no surer than ``std_px``."""
+    """The cable with axes whose standard deviation is ``std_px`` at least."""
     rough = at_least(cable.rough, std_px)
     chord = chord_frame(rough, cable.chord.plane, cable.chord.axis_parallax_std)
     return replace(cable, rough=rough, chord=chord)
 
 
 def _tied(shots: list[Shot], cables: Sequence[Followed | Rejected], settings: VisionSettings) -> list[Line]:
-    """Centerlines of the cables, each tied to its axes by what the others tell of how a cable passes them."""
+    """Centerlines, each tied to its axes by what the other photos tell of how a cable passes them."""
     sights = [None if isinstance(cable, Rejected) else cable.sight() for cable in cables]
     told = iter(told_by_others([sight for sight in sights if sight is not None]))
     axes = [None if sight is None else next(told) for sight in sights]
@@ -203,7 +203,7 @@ def _tied(shots: list[Shot], cables: Sequence[Followed | Rejected], settings: Vi
 
 
 def _doubted(line: Centerline | Rejected, calibration: Calibration) -> Centerline | Rejected:
-    """The line with what its plane leaves open; a plane that is not finite there costs that photo."""
+    """Add what its plane leaves open to the band of a centerline; refuse it where that is not finite."""
     if isinstance(line, Rejected):
         return line
     doubted = guarded(line.image, partial(with_doubt_of_plane, line, calibration))

@@ -165,7 +165,7 @@ def _count_alike(shots: list[Shot], most: float, length_px: float | None = None)
 
 
 def _once_more(search: _Search, shots: list[Shot]) -> list[Shot]:
-    """Photos on which no cable was found: searched again with what the others tell that they were not told.
+    """Search photos without a cable again, with what the other photos have told since.
 
     Those before the first cable had no neighbour. Without a scale the covers are expected in widths of the cable, and
     any width passes for the cable's; where its shaded side is as dark as the ground it seems narrower on some photos

@@ -101,7 +101,7 @@ def wandering_px(found: Sequence[RoughCable], play_px: float) -> tuple[Side, flo
 
 
 def at_least(cable: RoughCable, std_px: float) -> RoughCable:
-    """The cable with axes no surer than ``std_px``."""
+    """The cable with axes whose standard deviation is ``std_px`` at least."""
     left, right = (replace(axis, std_px=max(axis.std_px, std_px)) for axis in (cable.left, cable.right))
     return replace(cable, left=left, right=right)
 

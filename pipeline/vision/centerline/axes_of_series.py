@@ -39,7 +39,7 @@ _STRANGE = 9.2  # squared distance of two misses from what is expected, in stand
 
 @dataclass(frozen=True)
 class AxisSight:
-    """How one photo sees its cable pass the axes.
+    """How far beside its axes the cable of one photo passes, continued as a bow.
 
     Attributes
     ----------
@@ -72,13 +72,13 @@ class AxesTold:
 
 
 def told_alone(sight: AxisSight) -> AxesTold:
-    """What is expected of a photo of which no others tell."""
+    """Expected misses of a photo of which no other photo tells."""
     common = _common(sight, sight.places.mean(axis=0))[:, :_PARALLAX]
     return AxesTold(np.zeros(2), sight.play**2 * np.eye(2) + common @ common.T)
 
 
 def told_by_others(sights: Sequence[AxisSight]) -> list[AxesTold]:
-    """What the other photos of a series tell of each.
+    """Expected misses of each photo by all other photos of the series.
 
     Parameters
     ----------

@@ -186,7 +186,7 @@ def _guides(rough: RoughCable, along: Array, half_width: float) -> tuple[Array, 
 
 
 def _lead(start: float, axis: Array, seam: float, s: Array, points: Array) -> Callable[[Array], Array]:
-    """Cubic from an axis at ``start``, where it is straight, that goes on like a parabola through points ``s``."""
+    """The unseen piece from an axis: a cubic, straight at ``start``, that joins the parabola through points ``s``."""
     there, slope = np.polynomial.polynomial.polyfit(s - seam, points, 2)[:2]
     reach, chord = seam - start, (there - axis) / (seam - start)
     third = 0.5 * (slope - chord) / reach**2

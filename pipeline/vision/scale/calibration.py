@@ -252,7 +252,7 @@ def _local_scale(calibration: Calibration, found: list[RoughCable]) -> float:
 
 
 def with_doubt_of_plane(line: Centerline, calibration: Calibration) -> Centerline:
-    """The line with the errors of its scale and plane, the same on all photos, in the band of its curvature.
+    """Add the errors of scale and plane, the same on all photos, to the band of a curvature.
 
     A scale too large by a share d makes every curvature too large by d. Maps one standard deviation aside bend the path
     by an amount of their own: ``var += (std_uniform kappa)^2 + sum_i (kappa(map_i) - kappa(map))^2``.

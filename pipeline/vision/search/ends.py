@@ -151,7 +151,7 @@ def onto_curve(axis: Bearing, place: Array, width: float) -> Bearing:
 
 
 def led_on(body: Array, outward: Array, reach: float, width: float, *, base: float = 4.0) -> Array:
-    """The body (n, 2) and a parabola through its last ``base`` widths, ``reach`` onward, in the unit of the body."""
+    """Continue a path (n, 2) by the parabola through its last ``base`` widths, ``reach`` onward, in its unit."""
     across = np.array([-outward[1], outward[0]])
     along, aside = (body - body[-1]) @ outward, (body - body[-1]) @ across
     # counted from the end: a loop may come back beside it

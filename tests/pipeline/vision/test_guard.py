@@ -24,6 +24,7 @@ def test_the_photo_whose_absence_heals_is_to_blame() -> None:
 
     assert jointly("ab", (1.0, 2.0), total) == 3.0
     assert jointly("ab", (1.0, 0.0), total) == 1.0
+    assert jointly("abc", (0.0, 1.0, 0.0), total) == 1.0
     both = jointly("ab", (0.0, 0.0), total)
     assert isinstance(both, Rejected) and "the tracing failed (AssertionError: a zero)" in both.reason
 
