@@ -107,7 +107,7 @@ INSIDE = {
     ],
     "pipeline.vision.bearings": [("rim",), ("rings", "cut"), ("covers",), ("cover_size", "steady")],
     "pipeline.vision.centerline": [
-        ("curvature", "smoothing", "ground_waves"),
+        ("curvature", "smoothing", "slow_light", "ground_waves"),
         ("edge_profile",),
         ("curve_fit", "edges", "axes_of_series"),
         ("midline", "continuation"),

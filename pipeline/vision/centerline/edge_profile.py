@@ -21,7 +21,8 @@ from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
 from pipeline.records import Array
-from pipeline.vision.median import MAD_TO_STD, median, medians, quantile, scatter
+from pipeline.vision.centerline.slow_light import steadied
+from pipeline.vision.median import MAD_TO_STD, median, medians, quantile
 
 Float32 = NDArray[np.float32]
 Real = TypeVar("Real", Array, Float32)
@@ -48,9 +49,6 @@ _USUAL_RAMP = 0.07
 halo, grid and texture: of thin cables, whose few pixels do not tell them apart, free ramps moved the midline by a third
 more.
 """
-_SLOW_LIGHT_ORDER = 5  # of the polynomial of s that level and step of an edge follow on an even sheath and ground
-_BLOCK, _LASTING = 8, 4.0  # sections, and blocks of them that a misfit of level or step lasts at most
-_CHANCE = 1.2  # of the errors' variance; as much is found where nothing is off
 _PROFILE_WINDOWS = 16  # along the cable; in each, blur and shading of the edges are found: light turns slowly
 
 
@@ -104,11 +102,6 @@ class Profiles:
     def at(self, s: Array, name: str) -> Array:
         """A quantity by name at ``s``, linear between windows: ``(2, n)``."""
         return np.stack([np.interp(s, self.s, side) for side in getattr(self, name)])
-
-    def slow(self, s: Array, name: str) -> Array:
-        """The same as a polynomial of s: light turns with the cable, once from end to end."""
-        order = min(_SLOW_LIGHT_ORDER, len(self.s) - 1)
-        return np.stack([np.polynomial.Legendre.fit(self.s, side, order)(s) for side in getattr(self, name)])
 
 
 def profile(offset: Real, place: Real, blur: Real) -> tuple[Real, Real, Real, Real]:
@@ -357,28 +350,6 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int =
     # What hides the cable has no edge, but noise has a step wherever it is sought, half of them upward.
     faint = step < _LEAST_STEP_SIGMAS * np.sqrt(covariance[:, 1, 1])
     found = np.where((weight.sum(axis=1) < _LEAST_PIXEL_SHARE * count) | faint, np.nan, place).reshape(shape)
-    off = np.stack([level - profiles.slow(s, "level").ravel(), step - profiles.slow(s, "step").ravel()], axis=1)
-    steady, std = _steadied(found, off.reshape(*shape, 2), covariance.reshape(*shape, 3, 3))
+    light, errors = np.stack([level, step], axis=1).reshape(*shape, 2), covariance.reshape(*shape, 3, 3)
+    steady, std = steadied(found, light, errors, s)
     return Edges(steady, std, step.reshape(shape))
-
-
-def _steadied(place: Array, off: Array, covariance: Array) -> tuple[Array, Array]:
-    """Places of edges ``(2, n)`` and their standard deviations, by how far level and step are ``off`` the profiles'.
-
-    On an even sheath and ground level and step are those of the windows, up to a variance ``extra`` for texture and
-    light, which the sections tell: misfit that lasts would move many places alike, and counts as often as it lasts. So
-    much as they are off beyond that, the place is off as its covariance ``(2, n, 3, 3)`` with level and step tells.
-    """
-    variance = np.diagonal(covariance[..., :2, :2], axis1=2, axis2=3)
-    usual = np.median(variance, axis=(0, 1))
-    # Letters and dirt are no light: what they do to a section says nothing of its place.
-    near = np.abs(off) < 4.0 * np.sqrt(variance + scatter(off, 0.0) ** 2)
-    plain = (np.isfinite(place) & near.all(axis=2))[..., None]
-    each = np.where(plain, off, 0.0)
-    blocks = each[:, : each.shape[1] // _BLOCK * _BLOCK].reshape(2, -1, _BLOCK, 2).mean(axis=2)
-    single, lasting = (np.mean(part**2, axis=(0, 1)) for part in (each, blocks))
-    extra = np.maximum(single - _CHANCE * usual, _LASTING * (_BLOCK * lasting - _CHANCE * usual))
-    shared, allowed = covariance[..., :2, 2], covariance[..., :2, :2] + np.diag(np.maximum(extra, 0.0) + 1e-12)
-    gain = np.linalg.solve(allowed, shared[..., None])[..., 0] * plain
-    std = np.sqrt(np.maximum(covariance[..., 2, 2] - (gain * shared).sum(axis=2), 0.0))
-    return place - (gain * off).sum(axis=2), std

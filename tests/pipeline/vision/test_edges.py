@@ -112,21 +112,6 @@ def test_noise_has_no_edge():
     assert found[:, :65].all() and found[:, 175:].all()
 
 
-def test_level_and_step_along_the_cable_tell_the_place_of_an_edge_that_noise_leaves_open():
-    """Known, they leave a place in a window of 15 pixels 0.8 times the error that it has where each section is free."""
-    off = []
-    for seed in range(4):
-        rng = np.random.default_rng([17, seed])
-        for texture in (0.0, 0.1):
-            pixels = pixels_of(np.zeros((2, 240)), rng, noise=0.06)
-            pixels.value[:] += texture * rng.standard_normal((2, 240, 1)).astype(np.float32)
-            place, std = (getattr(fitted(pixels)[1], name) for name in ("place", "std"))
-            off.append((np.sqrt(np.nanmean(place**2)), np.mean(std)))
-    (even, stated), (rough, _) = np.array(off).reshape(4, 2, 2).mean(axis=0)
-    assert even < 0.95 * rough  # sections and texture leave half of that gain
-    assert_allclose(stated, even, rtol=0.1)
-
-
 def straight(length=400.0, v=60.0) -> PlaneCurve:
     frame = make_frame(0.0, length, intervals=16, order=3)
     return PlaneCurve(frame, np.zeros(frame.size - 2), np.array([frame.grid[frame.anchor] + 20.0, v]), 0.0)
