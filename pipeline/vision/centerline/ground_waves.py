@@ -94,6 +94,7 @@ def edge_waves(photos: Sequence[HalfWidths], *, metres_per_px: float, lay: float
     lay : m
         What all photos err alike for what was taken off them (`pipeline.vision.centerline.lay`).
     """
+    photos = [photo for photo in photos if photo.s.size]  # one on which each section lives on one edge tells nothing
     if not photos:
         return Waves()
     seen, least = seen_waves(photos), _LEAST_WAVE_PX * metres_per_px

@@ -49,6 +49,12 @@ def test_few_sections_tell_nothing():
     assert seen_waves([]) == Waves()
 
 
+def test_a_photo_whose_sections_live_on_one_edge_tells_nothing():
+    nothing = np.empty(0)
+    photos = [HalfWidths(nothing, nothing, nothing, 0.0)]
+    assert edge_waves(photos, metres_per_px=1e-4) == Waves()
+
+
 def test_waves_that_all_photos_have_alike():
     rng = np.random.default_rng(6)
     found = []
