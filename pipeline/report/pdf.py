@@ -158,9 +158,12 @@ def answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
 
 def list_troubles(sheet: Sheet, findings: list[FindingPart], words: Words) -> None:
     """Warnings and errors as far as the page has room, and how many more there are."""
+    size = 9.0
+    if findings and sheet.room() < LEADING * (10.0 + 2.0 * size):  # of a title and a line under it
+        sheet.text(f"{words('nav_findings')}: {words('more_findings', count=len(findings))}", size=size)
+        return
     if findings:
         sheet.text(words("nav_findings"), bold=True)
-    size = 9.0
     for number, finding in enumerate(findings):
         told = f"{words(f'level_{finding.level}')}: {words.said(finding.said).sentence}"
         if sheet.room() < LEADING * size * (len(_lines(told, size)) + 1) + size:

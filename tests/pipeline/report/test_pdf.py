@@ -61,3 +61,11 @@ def test_findings_that_find_no_room_are_counted():
     assert 10 < shown < 60
     assert told[-1] == f"{60 - shown} weitere in report.html."
     assert sheet.room() > 0.0
+
+
+def test_findings_that_find_no_room_for_a_title_are_counted_above_the_number_of_the_page():
+    sheet = Sheet("cable-07")
+    sheet.y += sheet.room() - 1.0
+    list_troubles(sheet, [FindingPart.of("warning", Message("photo/unreadable"))] * 2, Words("en"))
+    assert sheet.figure.texts[-1].get_text() == "What was wrong: 2 more in report.html."
+    assert sheet.y < 842.0 - 20.0 - 8.0  # its own letters and those of the number, 8 pt
