@@ -34,9 +34,6 @@ Array = NDArray[np.float64]
 REACH = 0.25
 """Of the abscissa: so far apart the log compliance of a rough law has forgotten itself."""
 
-ROUNDING = 1e-11
-"""Of the scale of an unknown: what falls below is rounding."""
-
 REST_SLOPES = (0.5, 3.0)
 """Prior standard deviations of g1 at rest: of cables that bend alike to both sides, whose law is flat there, and of
 such as were set and are steepest there."""
@@ -217,17 +214,6 @@ class Conditioned(NamedTuple):
     evidence: Array
 
 
-def inverse_root(H: Array) -> tuple[Array, Array]:
-    """W (..., r, r) with W' W = H^-1, and log|H| (...), of matrices that may have no full rank but for rounding."""
-    shown = np.einsum("...ii->...i", H)
-    scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
-    whole = H / (scale[..., :, None] * scale[..., None, :])
-    np.einsum("...ii->...i", whole)[...] += ROUNDING
-    root = np.asarray(np.linalg.cholesky(whole), dtype=np.float64)
-    log_det = 2.0 * np.log(np.einsum("...ii->...i", root) * scale).sum(axis=-1)
-    return np.linalg.inv(root) / scale[..., None, :], log_det
-
-
 def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned:
     """Posterior of the coefficients for all tau at once: data and form are diagonal in one and the same coordinates.
 
@@ -240,8 +226,10 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
     a : (p,)
     one : Family
     """
-    root, log_scale = inverse_root(schur + one.fixed + one.form)
-    root = root.swapaxes(-1, -2)
+    scales, axes = np.linalg.eigh(schur + one.fixed + one.form)
+    # where rounding is all that data and prior tell, it must not become a negative variance
+    scales = np.maximum(scales, len(a) * np.finfo(float).eps * scales[..., -1:])
+    root = axes / np.sqrt(scales)[..., None, :]
     share, turned = np.linalg.eigh(root.swapaxes(-1, -2) @ one.form @ root)
     vectors = root @ turned
     share, tau = np.clip(share, 0.0, 1.0)[..., None, :], TAUS[:, None]
@@ -252,6 +240,6 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
     toward = (turn @ pull)[..., None, :, :] - known
     prior = a @ (one.fixed @ a) + (a @ (one.form @ a)) / TAUS**2
     gained = np.sum(toward**2 / precisions[..., None], axis=-2) - prior[:, None]
-    log_det = np.sum(np.log(precisions), axis=-1) + log_scale[..., None]
+    log_det = np.sum(np.log(precisions), axis=-1) + np.sum(np.log(scales), axis=-1)[..., None]
     evidence = (one.log_norms - 0.5 * log_det)[..., None] + 0.5 * gained
     return Conditioned(vectors, precisions, toward / precisions[..., None], evidence)

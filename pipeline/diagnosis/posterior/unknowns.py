@@ -19,9 +19,12 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, Products
 from rod.inverse.fit import Fit
-from rod.law_prior import Conditioned, conditioned, inverse_root
+from rod.law_prior import Conditioned, conditioned
 
 Array = NDArray[np.float64]
+
+ROUNDING = 1e-11
+"""Of the scale of an unknown: what falls below is rounding."""
 
 NOTHING = 30.0
 """Of log p: what lies so far below the largest is nothing whatever the prior of an amount makes of it."""
@@ -64,7 +67,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     several, size = residuals.shape[1], fitted.extension.base.law.size
     products, normal = _products(grid, fitted, more, residuals)
     law = slice(several, several + size)
-    half, log_det = inverse_root(products.own[:, law.stop :, law.stop :])
+    half, log_det = _inverse_root(products.own[:, law.stop :, law.stop :])
     pull, across = np.split(half @ products.own[:, law.stop :, : law.stop], [several], axis=2)
     schur = products.own[:, law, law] - across.swapaxes(1, 2) @ across
     pulls = products.own[:, law, :several] - across.swapaxes(1, 2) @ pull
@@ -108,6 +111,16 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
         known[row, several + at - len(beyond)] = 1.0 / width
     found = grid.products(columns[:data], known, fitted.jacobian[:data, beyond], more[:data])
     return found, sum(_log_known(fitted)) - float(np.sum(np.log(std)))
+
+
+def _inverse_root(H: Array) -> tuple[Array, Array]:
+    """W (G, r, r) with W' W = H^-1, and log|H| (G,)."""
+    shown = np.einsum("gii->gi", H)
+    scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
+    whole = H / (scale[:, :, None] * scale[:, None, :])
+    np.einsum("gii->gi", whole)[:] += ROUNDING
+    root = np.asarray(np.linalg.cholesky(whole), dtype=np.float64)
+    return np.linalg.inv(root) / scale[:, None], 2.0 * np.log(np.einsum("gii->gi", root) * scale).sum(axis=1)
 
 
 def _by_one_prior(fitted: Fit, schur: Array, pulls: Array) -> Array:

@@ -53,7 +53,7 @@ def test_nearest_twin():
 
 def test_of_two_causes_none_is_said_to_be_perhaps_the_other():
     slips, tilts, drifts = 3, 18, 13
-    both = SimpleNamespace(causes=(slips, tilts), amount=lambda kind: (1.0, 0.1))
+    both = SimpleNamespace(causes=(slips, tilts), amount=lambda kind: (1.0, 0.1), size=lambda kind: None)
     places = ((slips,), (tilts, slips, drifts))  # that only one of them acts is a hypothesis of its own
     found = SimpleNamespace(
         accepted=both, classes=places, posterior=SimpleNamespace(of=lambda k: 0.7), unmodelled=False
