@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes.law import multiplied
 from rod.inverse.cause import Cause, Variant
-from rod.inverse.prediction import Facts, Model, Prediction
+from rod.inverse.prediction import Facts, Model
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ class _Begun(Cause):
     def course(variant: Variant, facts: Facts) -> Array:
         """Share (steps,) of what has begun."""
         passed = np.arange(len(facts.branch)) - variant.at
-        return np.asarray((passed >= 0.0) * (1.0 + variant.width * np.maximum(passed, 0.0)))
+        return np.where(passed < 0.0, 0.0, 1.0 + variant.width * passed)
 
 
 class OtherRest(_Begun):
@@ -70,12 +71,7 @@ class OtherStiffness(_Begun):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Multiply the forces by ``1 + amount`` from the step ``at`` on."""
         factor = 1.0 + amount * self.course(variant, facts)
-
-        def observer(prediction: Prediction, facts: Facts) -> Prediction:
-            samples = tuple(by * force for by, force in zip(factor, prediction.samples, strict=True))
-            return replace(prediction, force=factor * prediction.force, samples=samples)
-
-        return model.observed(observer)
+        return model.observed(multiplied(factor, factor[:, None]))
 
 
 BEGUN: tuple[Cause, ...] = (OtherRest(), OtherStiffness())

@@ -12,6 +12,7 @@ Where nothing but the cable resists, moments multiplied alike multiply the force
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.load_cell import SETTLING, passed
 from rod.inverse.cause import Cause, Variant
-from rod.inverse.prediction import Facts, Model, Prediction
+from rod.inverse.prediction import Facts, Model, Observer, Prediction
 from rod.section import InternalFriction, growth
 
 Array = NDArray[np.float64]
@@ -181,9 +182,14 @@ class StiffnessDrift(Cause):
             1.0 + change * passed(first + pace * times, variant.width)
             for first, times in zip(begin, facts.hold_times, strict=True)
         ]
+        return model.observed(multiplied(photo, held))
 
-        def observer(prediction: Prediction, facts: Facts) -> Prediction:
-            samples = tuple(factor * force for factor, force in zip(held, prediction.samples, strict=True))
-            return replace(prediction, force=photo * prediction.force, samples=samples)
 
-        return model.observed(observer)
+def multiplied(photo: Array, held: Sequence[Array] | Array) -> Observer:
+    """Observer of moments that are multiplied alike everywhere: forces at the photos (n,), and samples by hold."""
+
+    def observer(prediction: Prediction, facts: Facts) -> Prediction:
+        samples = tuple(factor * force for factor, force in zip(held, prediction.samples, strict=True))
+        return replace(prediction, force=photo * prediction.force, samples=samples)
+
+    return observer
