@@ -228,7 +228,7 @@ def bend(
     controls = [(name, value) for name, value in given.items() if value is not None]
     if len(controls) + (tip is not None) != 1:
         raise ValueError("give exactly one of displacement, chord, force and tip")
-    test = BendingTest(length, law, **cable)  # type: ignore[arg-type]  # __post_init__ makes a moment curve of it
+    test = BendingTest(length, as_law(law, length=length), **cable)
     if (tip is not None) != (test.right.kind == "free"):
         raise ValueError("tip is the force on a free end: give it with right=FREE, and only there")
     if tip is not None:
