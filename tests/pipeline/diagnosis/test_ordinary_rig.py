@@ -12,6 +12,8 @@ from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.trials import f_error
 from pipeline.diagnosis.causes.camera import tilt_of
 from pipeline.diagnosis.diagnose import diagnose
+from pipeline.diagnosis.explanations.search import searched
+from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.posterior.detectable import found_at
 from pipeline.diagnosis.posterior.error_grid import AS_RIGS_ARE, MOVED
 from pipeline.diagnosis.posterior.hypotheses import SHARES
@@ -67,3 +69,12 @@ def test_a_zero_is_named_from_a_few_times_that_of_every_rig(told):
     odds = math.log(SHARES[0][0] / SHARES[1][0] * 2 * 19)
     needed = found_at(weight / weight.sum(), 1.0 / known, odds, 30.0 * usual, usual, 0)
     assert 2.0 * ordinary < needed < 6.0 * ordinary
+
+
+def test_what_every_rig_has_starts_no_search():
+    """Scores take the zero of the displacement for exact, what is believed does not."""
+    test = hidden_test(Cable(), LOOP, largest=LARGEST, seed=91, reading=Reading(play=2e-5))
+    bench = prepare(faults_of_input(test), DiagnosisSettings())
+    assert bench.largest > 4.0 * bench.limit
+    search = searched(bench)
+    assert search.posterior.word == "base" and not any(one.found for one in search.hypotheses)
