@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,15 +183,29 @@ SLOWLY = "by as much in every tenfold of the time"
 def lost_unseen(fitted_amount: float, variant: Variant, facts: Facts) -> float:
     """Share of a force that relaxation takes in one interval of the log: a hold may have begun that much earlier."""
     intervals = np.concatenate([np.diff(times) for times in facts.hold_times])
-    return float(_lost(fitted_amount, variant, facts, np.median(intervals)))
+    return fitted_amount * float(_lost(variant, facts, np.median(intervals)))
 
 
-def _lost(amount: float, variant: Variant, facts: Facts, since: Array) -> Array:
-    """Share of a moment that is lost a time after it came."""
+def _lost(variant: Variant, facts: Facts, since: Array) -> Array:
+    """Share of a moment that is lost a time after it came, per unit of amount."""
     if variant.label == SLOWLY:
         longest = max(float(np.ptp(times)) for times in facts.hold_times)
-        return np.asarray(amount * np.log1p(since / variant.at) / np.log1p(longest / variant.at))
-    return np.asarray(-amount * np.expm1(-since / variant.at))
+        return np.asarray(np.log1p(since / variant.at) / np.log1p(longest / variant.at))
+    return np.asarray(-np.expm1(-since / variant.at))
+
+
+@lru_cache(maxsize=64)
+def _lost_by_hold(variant: Variant, facts: Facts) -> tuple[Array, ...]:
+    """The same for each hold: of what came with each hold up to it (k + 1, n + 1), at its n samples and at its photo.
+
+    Without a memory only of what the hold itself carries, (1, n + 1). Kept: one form is simulated a hundred times.
+    """
+    table = []
+    for k, times in enumerate(facts.hold_times):
+        own = np.append(times, facts.photo_time[k])
+        since = facts.clock[k] + own - facts.clock[: k + 1, None] if variant.width else own[None]
+        table.append(_lost(variant, facts, since))
+    return tuple(table)
 
 
 class Relaxation(Cause):
@@ -240,23 +254,21 @@ class Relaxation(Cause):
         With a memory (``width`` 1) it is the changes of the moment, force times bow, from hold to hold that decay so,
         each since its own hold began: a standard linear solid, by Boltzmann's superposition.
         """
-        lost = partial(_lost, amount, variant, facts)
+        lost = _lost_by_hold(variant, facts)
 
         def observer(prediction: Prediction, facts: Facts) -> Prediction:
             at_once = prediction.force if prediction.at_once is None else prediction.at_once
             bow = np.maximum(np.max(np.abs(prediction.y), axis=-1), 1e-9 * facts.length)
             change = np.diff(at_once * bow, prepend=0.0, axis=-1)
 
-            def taken(k: int, times: Array) -> Array:
+            def taken(k: int) -> Array:
                 if not variant.width:
-                    return np.asarray(at_once[..., k, None] * lost(times))
-                since = facts.clock[k] + times - facts.clock[: k + 1, None]
-                return np.asarray(change[..., : k + 1] @ lost(since) / bow[..., k, None])
+                    return np.asarray(amount * at_once[..., k, None] * lost[k][0])
+                return np.asarray(amount * change[..., : k + 1] @ lost[k] / bow[..., k, None])
 
-            samples = tuple(held - taken(k, facts.hold_times[k]) for k, held in enumerate(prediction.samples))
-            photo = [taken(k, facts.photo_time[k : k + 1]) for k in range(len(samples))]
-            return replace(
-                prediction, force=prediction.force - np.concatenate(photo, axis=-1), samples=samples, at_once=at_once
-            )
+            gone = [taken(k) for k in range(len(lost))]
+            samples = tuple(held - one[..., :-1] for held, one in zip(prediction.samples, gone, strict=True))
+            force = prediction.force - np.stack([one[..., -1] for one in gone], axis=-1)
+            return replace(prediction, force=force, samples=samples, at_once=at_once)
 
         return model.observed(observer)
