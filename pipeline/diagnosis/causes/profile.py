@@ -32,10 +32,6 @@ STEEPEST = 10.0
 """Usual amounts: standard deviation of the longest wave; that of the k-th is a k-th of it, as of a sharp step. Without
 a photo of the force-free cable short waves and the law else run away together: 24 waves grew to 1 to 4 1/m."""
 
-WAVE_COST = 4
-"""Free numbers that one wave counts for: it is known beforehand to a few usual amounts and afterwards to a fiftieth of
-that (exp(-4)). As cheap as the others, eight waves stood alone for a spot and a spring in the bearings."""
-
 SEAM, PIECE = "in a step", "in a piece"
 
 LEAST = 0.05
@@ -89,11 +85,6 @@ def wave(half_periods: int) -> Variant:
     Plausible amounts fall with that number as they do for a step; see `STEEPEST`.
     """
     return Variant("in waves", at=-float(half_periods), known=STEEPEST / half_periods)
-
-
-def is_wave(variant: Variant) -> bool:
-    """Whether a form is one of them."""
-    return bool(np.isfinite(variant.known))
 
 
 def profile(variant: Variant, position: Array, *, from_beside: bool = False) -> Array:

@@ -147,20 +147,18 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) 
     return fitted
 
 
-def as_one_form(observation: Observation, fitted: Fit, *, worse: float) -> Fit:
-    """Replace several forms along the cable by one spot, piece or step, if chi-square rises by no more than ``worse``.
+def as_one_form(observation: Observation, fitted: Fit) -> list[Fit]:
+    """One spot, piece or step in the place of several forms along the cable, the best of the three; empty without any.
 
     A strong spot sought from beside its place ends in a minimum of its own; the sum of the forms tells where it is.
     """
-    extension = fitted.extension
+    extension, found = fitted.extension, list[Fit]()
     count = len(extension.terms)
     if count < 2 or len(extension.terms_of(extension.terms[0].cause)) < count:
-        return fitted
-    cause, best = extension.terms[0].cause, fitted
+        return []
+    cause = extension.terms[0].cause
     for variant, amount, stiffer in forms_between(extension.base_model(fitted.vector), extension.model(fitted.vector)):
         alone = Extension(extension.base, extension.facts, (Term(cause, variant),))
         start = alone.base.stiffer(alone.start(fitted.vector, (amount,)), 1.0 + stiffer)
-        one = fit_from(observation, alone, start, fitted)
-        enough = fitted.chi2 + worse if best is fitted else best.chi2
-        best = one if one.run.prediction is not None and one.chi2 < enough else best
-    return best
+        found.append(fit_from(observation, alone, start, fitted))
+    return sorted((one for one in found if one.run.prediction is not None), key=lambda one: one.chi2)[:1]

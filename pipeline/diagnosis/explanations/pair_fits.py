@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
 from pipeline.diagnosis.explanations.forms import with_more_forms
-from pipeline.diagnosis.explanations.free_profile import with_free_profile
+from pipeline.diagnosis.explanations.free_profile import free_profile, leaves_more
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -78,17 +78,15 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
     """The best pairs with further forms that have a place, and with profiles of any form; hopeless ones left out."""
     new: list[Explanation] = []
     for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
-        rival = min(e.fitted.chi2 for e in (*found, *new))
-        fitted, hopeless = pair.fitted, rival + LEAST
+        hopeless, fitted = min(e.fitted.chi2 for e in (*found, *new)) + LEAST, [pair.fitted]
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
-            fitted = with_free_profile(bench.observation, fitted, kind, hopeless=hopeless)
-            if kind.varies or not kind.combines:
-                continue
-            for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
-                fitted = with_more_forms(bench.observation, fitted, kind, setting, hopeless=hopeless)
-        if fitted is not pair.fitted:
-            new.append(explanation_of(pair.causes, bench.base, fitted))
-        new += by_step(bench, explanation_of(pair.causes, bench.base, fitted))
+            if kind.varies and leaves_more(fitted[-1]):
+                fitted += [free for free in [free_profile(bench.observation, fitted[-1], kind)] if free is not None]
+            elif kind.combines:
+                for setting in {term.variant.setting for term in fitted[-1].extension.terms if term.cause is kind}:
+                    fitted.append(with_more_forms(bench.observation, fitted[-1], kind, setting, hopeless=hopeless))
+        new += [explanation_of(pair.causes, bench.base, one) for one in dict.fromkeys(fitted) if one is not pair.fitted]
+        new += by_step(bench, explanation_of(pair.causes, bench.base, fitted[-1]))
     return new
 
 

@@ -23,7 +23,7 @@ from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
-from pipeline.diagnosis.explanations.single_cause import refit_one
+from pipeline.diagnosis.explanations.single_cause import refits
 from pipeline.diagnosis.fits.search import Suspicion, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
@@ -97,10 +97,10 @@ class Search:
         for cause in causes:
             if not self.bench.suspicion.of(cause).size:
                 continue
-            one = refit_one(self.bench.observation, self.bench.base, self.bench.suspicion, cause, rival=rival)
-            if one is not None and one.gain > 0.0:
-                rival = min(rival, one.fitted.chi2)
-                yield from (one, *by_step(self.bench, one))
+            for one in refits(self.bench.observation, self.bench.base, self.bench.suspicion, cause, rival=rival):
+                if one.gain > 0.0:
+                    rival = min(rival, one.fitted.chi2)
+                    yield from (one, *by_step(self.bench, one))
 
     def beside(self, one: Explanation) -> Suspicion:
         """Scores of all causes about a single cause."""

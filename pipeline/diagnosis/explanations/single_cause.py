@@ -2,17 +2,16 @@
 
 A score says where to begin, and no more: a soft spot on one side looks like a stiff one on the other until it has found
 its place. So a refit starts from several forms. Of each setting (what all forms that act together have in common) the
-best goes on, further forms are added where they may act together, and the cheapest model is the explanation.
+best goes on, and further forms are added where they may act together.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
-from pipeline.diagnosis.explanations.forms import SHAPE_GAIN, as_one_form, with_more_forms
-from pipeline.diagnosis.explanations.free_profile import price, with_free_profile
+from pipeline.diagnosis.explanations.forms import as_one_form, with_more_forms
+from pipeline.diagnosis.explanations.free_profile import free_profile, leaves_more
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
@@ -21,64 +20,50 @@ from rod.inverse.fit import FITS, Fit, fit_from
 from rod.inverse.observation import Observation
 
 
-def refit_one(
+def refits(
     observation: Observation,
     base: Fit,
     suspicion: Suspicion,
     cause: int,
     *,
     rival: float = np.inf,
-) -> Explanation | None:
-    """Fit the model with one cause in it; None where it cannot be simulated or has no admissible amount.
+) -> list[Explanation]:
+    """Fit the model with one cause in it; empty where it cannot be simulated or has no admissible amount.
 
-    ``rival`` is the chi-square another cause has reached: one that stays far above it after its first fit is not tried
-    from other starts and with further forms.
+    In the few forms that explain the data best; a profile along the cable also in any form, and in the one form nearest
+    to what was found. ``rival`` is the chi-square another cause has reached: one that stays far above it after its
+    first fit is not tried from other starts and with further forms.
     """
-    kind = suspicion.causes[cause]
-    hopeless = rival + LEAST
-    found = _in_any_form(observation, base, suspicion, cause, hopeless) if kind.varies else None
-    if found is None:
-        best = _by_setting(observation, base, suspicion, cause, hopeless=hopeless)
+    kind, found = suspicion.causes[cause], list[Fit]()
+    first = _strong_profile(observation, base, suspicion, cause) if kind.varies and leaves_more(base) else None
+    if first is None:
+        best = _by_setting(observation, base, suspicion, cause, hopeless=rival + LEAST)
         if kind.combines:
             for setting, one in best.items():
-                best[setting] = _several(observation, one, kind, setting, hopeless=hopeless)
-        found = min(best.values(), key=cost, default=None)
-    return None if found is None else explanation_of((cause,), base, found)
+                best[setting] = with_more_forms(observation, one, kind, setting, hopeless=rival + LEAST)
+        found = [min(best.values(), key=cost)] if best else []
+    else:
+        found = [with_more_forms(observation, first, kind, "", hopeless=rival + LEAST)]
+    if kind.varies and found and leaves_more(found[0]):
+        found += [free for free in [free_profile(observation, found[0], kind)] if free is not None]
+    if kind.varies and found:
+        found += as_one_form(observation, found[-1])
+    return [explanation_of((cause,), base, one) for one in found]
 
 
-def _several(observation: Observation, one: Fit, kind: Cause, setting: str, *, hopeless: float) -> Fit:
-    """Add to a model with one form of a cause whatever further forms pay for themselves."""
-    several = with_more_forms(observation, one, kind, setting, hopeless=hopeless)
-    worse = SHAPE_GAIN * (len(several.extension.terms) - 1)
-    several = as_one_form(observation, several, worse=worse)
-    return with_free_profile(observation, several, kind, hopeless=hopeless)
+def refit_one(
+    observation: Observation, base: Fit, suspicion: Suspicion, cause: int, *, rival: float = np.inf
+) -> Explanation | None:
+    """The cheapest of `refits`."""
+    found = refits(observation, base, suspicion, cause, rival=rival)
+    return min(found, key=lambda one: cost(one.fitted), default=None)
 
 
-def _in_any_form(
-    observation: Observation,
-    base: Fit,
-    suspicion: Suspicion,
-    cause: int,
-    hopeless: float,
-) -> Fit | None:
-    """A profile along the cable: as waves (a nearly linear problem) where its best form leaves more than noise.
-
-    Where fewer forms do as well as the waves, they are the explanation.
-    """
-    kind, direction = suspicion.causes[cause], suspicion.best(cause)
-    to_the_noise = FITS * (len(base.residual) - base.extension.size)
-    if direction is None or base.chi2 < to_the_noise:
-        return None
-    first = fit_term(observation, base, suspicion, direction)
-    if first is None or first.chi2 < to_the_noise:
-        return None
-    free = with_free_profile(observation, first, kind)
-    if free.chi2 > to_the_noise:
-        return free if free.chi2 > hopeless else None  # what no profile does no few forms will do
-    worse = price(free, first)
-    spot = as_one_form(observation, free, worse=worse)
-    few = with_more_forms(observation, first, kind, "", hopeless=free.chi2 + worse)
-    return min((free, spot, few), key=cost)
+def _strong_profile(observation: Observation, base: Fit, suspicion: Suspicion, cause: int) -> Fit | None:
+    """A profile along the cable in its best form where that leaves more than noise: other forms alone will not do."""
+    direction = suspicion.best(cause)
+    first = None if direction is None else fit_term(observation, base, suspicion, direction)
+    return first if first is not None and leaves_more(first) else None
 
 
 def _by_setting(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.begun import BEGUN
-from pipeline.diagnosis.causes.profile import WAVE_COST, is_wave, largest, largest_of
+from pipeline.diagnosis.causes.profile import largest, largest_of
 from rod.inverse.cause import Variant
 from rod.inverse.fit import Fit
 
@@ -41,9 +41,7 @@ class Explanation:
     @property
     def worth(self) -> float:
         """Half of the chi-square removed, less one for every number fitted: which of many is worth going on with."""
-        terms = self.fitted.extension.terms
-        numbers = sum(len(term.variant.tuned) + (WAVE_COST if is_wave(term.variant) else 1) for term in terms)
-        return 0.5 * self.gain - numbers
+        return 0.5 * self.gain - sum(1 + len(term.variant.tuned) for term in self.fitted.extension.terms)
 
     def sigma(self, cause: Cause) -> float:
         """How many standard deviations the amounts of a cause, all its forms together, lie from zero."""
