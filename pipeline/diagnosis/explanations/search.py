@@ -102,6 +102,13 @@ class Search:
                     rival = min(rival, one.fitted.chi2)
                     yield from (one, *by_step(self.bench, one))
 
+    def likeliest(self) -> list[Explanation]:
+        """The likeliest single causes, and what is nearly as likely as the first one in another form of it."""
+        best = [one.found for one in self.posterior.explanations(count=1) if one.found is not None][:LIKELIEST]
+        plain = {one.found: one.plain for one in self.hypotheses if one.found is not None}
+        others = (one for one in plain if best and one.causes == best[0].causes and one is not best[0])
+        return [*best, *(one for one in others if plain[one] > plain[best[0]] + np.log(ALSO))]
+
     def beside(self, one: Explanation) -> Suspicion:
         """Scores of all causes about a single cause."""
         if one not in self._about:
@@ -232,7 +239,7 @@ def searched(bench: Workbench) -> Search:
         return search
     search.singles()
     search.begun()
-    singles = [one.found for one in search.posterior.explanations(count=1) if one.found is not None][:LIKELIEST]
+    singles = search.likeliest()
     if singles and (search.pairs_speak(singles[0]) or hidden):
         if not hidden and search.posterior.word == "rest":
             hidden = hidden_pair(bench.suspicion)
