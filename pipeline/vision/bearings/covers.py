@@ -28,7 +28,6 @@ from pipeline.vision.bearings.rim import (
     MIN_RIM,
     RADIUS_STD,
     SAME_RADIUS,
-    SEARCH_RADII,
     SURE_RIM,
     Circle,
     Radius,
@@ -40,12 +39,8 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
 from pipeline.vision.search.ends import CableEnd
 
-_INNER_DISC = 0.82
-"""Radii; bright middle of a cover whose rim is of the ground's look: sought between 0.72 and 0.92, smaller ones are
-marks, larger ones pass for the rim.
-"""
 _RING_WIDTH = 0.05  # radii; std of the ring that seeks centres: as well as the radius is known
-_MARK_RADII = 0.6  # radii of a cover; largest dot, screw or bevel that marks the axis of one not seen
+_MARK_RADII = 0.95  # radii of a cover; largest dot, screw, bevel or bright middle that marks the axis of one not seen
 _EXPECTED_REACH_RADII = 2.5
 """Radii; a cover of a neighbouring photo is sought again if the cable's end is so near: mostly it is one away, an end
 led astray by the cover's shadow two.
@@ -96,24 +91,13 @@ def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> 
         found = found if found is not None and found.rim >= MIN_RIM and _apart(found, cut) <= _SAME_COVER else None
     marked = _by_marks(photo, end, radius, found)
     if marked is None or cut is None:
-        return marked or _by_inner_disc(photo, end, radius, width_px) or cut
+        return marked or cut
     return cut if _apart(marked, cut) > _SAME_COVER else min(marked, cut, key=lambda circle: circle.std)
 
 
 def _apart(one: Circle, other: Circle) -> float:
     """Distance of two circles' centres in radii."""
     return float(np.hypot(*np.subtract(one.center, other.center)) / other.radius)
-
-
-def _by_inner_disc(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
-    """Cover with a middle that stands out, all round, of a rim that does not: the middle tells the axis."""
-    inner = Radius(_INNER_DISC * radius.px, 0.5 * SEARCH_RADII)
-    if inner.px < width_px:  # the end of the cable itself passes for a disc that is little wider than it
-        return None
-    disc = find_rim(photo, end, inner, width_px)
-    if disc is None or disc.rim < SURE_RIM:
-        return None
-    return replace(disc, radius=radius.px, radius_std=0.1 * radius.px, marked=True)
 
 
 def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
