@@ -146,10 +146,12 @@ def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | 
 
 
 def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected) -> bool:
-    """Whether the cable is seen better in one colour than in all: a stripe of it is narrower, grain has other edges."""
+    """Whether the cable is seen better in one colour: what is narrower or shorter may be a stripe or a half of it."""
     if isinstance(in_one, Rejected) or _is_piece(in_one):  # a piece of the cable may be anything of that colour too
         return False
-    if isinstance(found, Rejected) or in_one.half_width_px > _WIDER * found.half_width_px:
+    if isinstance(found, Rejected) or in_one.length_px > _WIDER * found.length_px:
+        return True
+    if in_one.half_width_px > _WIDER * found.half_width_px:
         return True
     return in_one.evidence.firmness > found.evidence.firmness
 
