@@ -57,7 +57,7 @@ def refusal(
     told = (
         _another_width(middle, diameter, sections.softest * middle / median(sections.width))
         or (None if evidence.enough else unlike_a_cable(evidence))
-        or (None if evidence.clear else _uneven(fit, sections, middle))
+        or (None if evidence.bordered else _uneven(fit, sections, middle))
         or _beside_cover(rough, fit, chord, middle)
         or _bent(fit, middle)
     )

@@ -83,12 +83,11 @@ def test_covers_unseen_in_the_colour_of_a_wire_are_found(tmp_path):
 
 
 def test_a_bundle_whose_outline_waves_is_traced(tmp_path):
-    """Strands that wind about each other move the middle of what is seen by 6 % of its width, to and fro."""
+    """Strands that wind about each other move both edges of what is seen to and fro, by a tenth of its width."""
     u, v = ((np.arange(n * FINER) + 0.5) / FINER - 0.5 for n in SIZE)
     t, width = (v[:, None] - bow(u)) / np.hypot(1.0, np.gradient(bow(u), u)), 26.0
-    inside = (
-        (np.abs(t - 0.06 * width * np.sin(2.0 * np.pi * u / (1.3 * width))) < 0.5 * width) & (u > 93.0) & (u < 716.0)
-    )
+    upper, lower = (0.1 * width * np.sin(2.0 * np.pi * u / (turns * width)) for turns in (1.3, 0.9))
+    inside = (t > lower - 0.5 * width) & (t < upper + 0.5 * width) & (u > 93.0) & (u < 716.0)
     line = trace_photo(taken(tmp_path, np.where(inside[..., None], GREEN, TABLE)), diameter_px=width)
     assert isinstance(line, Centerline)
     assert np.abs(np.median(beside(line))) < 0.1
