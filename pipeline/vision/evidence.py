@@ -27,6 +27,7 @@ _NULL = (1.15, 1.4, 1.65)  # widths from the midline where there is no edge; the
 _SURE = 3.0  # standard deviations; a block's edge that noise passes for once in 700
 _FIRM = 4.0  # the same; of the median block of a strip that leaves no doubt
 _LEAST_LIKENESS = 0.45  # cables on webcam photos reach 0.6 and more; with paper on a third of a cable 0.4 is left
+_STEADY = 0.1  # of what camera and edges explain: a width as constant as that is as good as any
 _LEVEL = 1.0 / 512.0  # of full range; half a level of 8 bits: no photo is calmer than its rounding
 _CALM_PX, _CALM = 0.5, 0.04  # width's scatter that every camera makes: px of halo, JPEG and grid; share of the width
 _ALIKE = 0.25  # of the step between strip and ground; grey levels nearer than that are those of one thing
@@ -75,9 +76,19 @@ class Evidence:
         return self.length * self.likeness
 
     @property
+    def firmness(self) -> float:
+        """Step of the edges over the scatter of the width: of two readings of one strip the larger is the better."""
+        return self.edges / max(self.unsteady, _STEADY)
+
+    @property
     def clear(self) -> bool:
         """True if this is so surely a cable that no other reading of the photo need be looked at."""
-        return self.seen >= 0.9 and self.edges >= _FIRM and self.unsteady <= 1.0 and self.crossed is None
+        return self.bordered and self.unsteady <= 1.0 and self.crossed is None
+
+    @property
+    def bordered(self) -> bool:
+        """True if both edges are surely seen nearly all along, whether they wave or not."""
+        return self.seen >= 0.9 and self.edges >= _FIRM
 
     @property
     def enough(self) -> bool:

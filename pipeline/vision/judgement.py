@@ -168,7 +168,8 @@ def _axes(
     leaving = [end.place for end in ends if at_border(end.place, photo, standout.reduction, width)]
     if leaving and cover is None and cable.bearings.given_px is None:
         return refused_at(photo, "photo/leaves-frame", leaving[0])
-    first, second = find_bearings(photo, ends, width, cable.bearings)
+    # in the colour of the cable a cover of another one may not be seen
+    first, second = find_bearings(photo.taken or photo, ends, width, cable.bearings)
     if first is not None and second is not None:
         return first, second
     if leaving:

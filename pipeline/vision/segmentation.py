@@ -138,13 +138,22 @@ def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | 
     standout = stand_out(photo, reduction, window=window)
     wanted = _wanted(standout, cable)
 
-    alike = in_one_colour(photo, standout)
-    if alike is not None:
-        found = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
-        # a piece of the cable may be anything that has that colour too
-        if isinstance(found, RoughCable) and not _is_piece(found):
-            return found
-    return _read(photo, standout, wanted, cable)
+    found, alike = _read(photo, standout, wanted, cable), in_one_colour(photo, standout)
+    if alike is None:
+        return found
+    in_one = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
+    return in_one if _is_better(in_one, found) else found
+
+
+def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected) -> bool:
+    """Whether the cable is seen better in one colour: what is narrower or shorter may be a stripe or a half of it."""
+    if isinstance(in_one, Rejected) or _is_piece(in_one):  # a piece of the cable may be anything of that colour too
+        return False
+    if isinstance(found, Rejected) or in_one.length_px > _WIDER * found.length_px:
+        return True
+    if in_one.half_width_px > _WIDER * found.half_width_px:
+        return True
+    return in_one.evidence.firmness > found.evidence.firmness
 
 
 def _is_piece(found: RoughCable) -> bool:

@@ -2,9 +2,10 @@
 
 ``photos with a cable from visible end to visible end -> circles of 1.4 to 6 diameters of it at both ends -> radius``
 
-A cable that vanishes ends on the rim of the cover, ahead of which the centre lies; a dot or screw of the right size
-lies too far ahead, a disc under a clamped end not far enough. One radius must serve both ends of several photos, all
-round: then it is what the user would have given as ``bearing_marker_mm``, and each photo is searched again with it.
+White bands, letters and shadows hide the last of a cable, so it is lost on the rim of its cover or ahead of it. One
+radius must serve both ends of several photos, all round: then it is what the user would have given as
+``bearing_marker_mm``, and each photo is searched again with it. At one end at least the cable must be lost so near that
+the circle is no dot or screw, which lies farther ahead.
 
 A cover with a raised edge, a bevel or a groove shows several circles about one axis; its rim is the largest under which
 the cable vanishes. Across a disc below it the cable is seen to run on.
@@ -16,7 +17,7 @@ Units: px.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -25,7 +26,7 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.vision.bearings.covers import find_rim
 from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, SURE_RIM, Circle, Radius
-from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks
+from pipeline.vision.bearings.rings import MARK_CELLS, find_marks
 from pipeline.vision.median import median, medians
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
@@ -41,12 +42,12 @@ _MARK_WIDTHS = 0.8
 usual size.
 """
 _MARK_ASIDE = 0.3  # of the distance ahead of the cable's end; how far aside of its direction the axis lies
-_END_ON_RIM = 0.4  # radii; how far from the rim the cable's mask may end: led straight on by a width at most
+_ON_RIM = 1.4  # radii from where a cable is lost to the centre of its cover: led straight on by a width at most
 _LOST_BEFORE_RIM = 1.9
-"""Radii from where a cable is lost to the centre of a cover; letters up to its rim hide 0.9 of it, a dot of half the
-cover's size lies two of its own radii ahead.
+"""The same at one end, where others lie farther; letters up to the rim hide 0.9 of it, a dot of half the cover's size
+lies two of its own radii ahead.
 """
-_LOST_CABLE_REACH = 3.1  # radii; the same where another end shows that it is a cover: as far as it is searched
+_LOST_CABLE_REACH = 3.1  # radii; at the others: as far as it is searched
 
 
 def cover_radius(seen: Iterable[tuple[Photo, RoughCable]]) -> float | None:
@@ -63,42 +64,38 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]]) -> float | None:
         None unless one radius fits both ends on every photo.
     """
     ends = [_LostEnd(photo, end, 2.0 * cable.half_width_px) for photo, cable in seen for end in visible_ends(cable)]
-    for radii in (_at_ends(ends), (_to_mark(end) for end in ends)):
-        alike = _alike(radii)
-        if alike is not None:
-            return median(alike)
-    return _common(ends) if ends else None
+    if not ends:
+        return None
+    to_marks = (_to_mark(end) for end in ends)
+    return _largest(ends, _ON_RIM, _ON_RIM) or _alike(to_marks) or _largest(ends, _LOST_CABLE_REACH, _LOST_BEFORE_RIM)
 
 
-def _at_ends(ends: list[_LostEnd]) -> Iterator[float | None]:
-    """Radius of the cover at each end: the first is sought in all sizes, the others in the one that it tells."""
-    first = _at_end(ends[0]) if ends else None
-    if ends:
-        yield first
-    for end in ends[1:]:
-        yield None if first is None else _same(end, first)
+def _largest(ends: list[_LostEnd], most: float, nearest: float) -> float | None:
+    """Radius of the largest circle that is seen at all ends, nearly all round, wherever each was lost before it.
 
-
-def _same(lost: _LostEnd, radius: float) -> float | None:
-    """Radius of the circle with the cable's end on its rim that is about as large as another end's."""
-    near = [size for size in lost.sizes() if abs(size / radius - 1.0) <= SEARCH_RADII]
-    for size in sorted(near, key=lambda size: abs(size - radius)):
-        circle = lost.near(float(size))
-        if circle is None or not lost.on_rim(circle):
-            continue
-        if abs(circle.radius - radius) <= SAME_RADIUS * radius:
-            return circle.radius
+    Each was lost ``most`` radii from its centre at most, and one of them ``nearest``. It is sought in all sizes at the
+    first end, in those that this tells at the others.
+    """
+    for first in sorted(ends[0].circles, key=lambda circle: -circle.radius):
+        found: list[Circle] = []
+        for end in ends:
+            circle = end.as_large(first.radius) if found else first
+            if circle is None or not end.lost_under(circle, most):
+                break
+            found.append(circle)
+        if len(found) == len(ends) and min(map(_LostEnd.ahead, ends, found)) <= nearest:
+            return median([circle.radius for circle in found])
     return None
 
 
-def _alike(values: Iterable[float | None]) -> list[float] | None:
-    """All values, if each is known and they are the same within what covers of one rig differ; else None."""
+def _alike(values: Iterable[float | None]) -> float | None:
+    """Middle of all values, if each is known and they are the same within what covers of one rig differ; else None."""
     known: list[float] = []
     for value in values:
         if value is None:
             return None
         known.append(value)
-    return known if known and np.ptp(known) <= SAME_RADIUS * np.mean(known) else None
+    return median(known) if np.ptp(known) <= SAME_RADIUS * np.mean(known) else None
 
 
 def _to_mark(lost: _LostEnd) -> float | None:
@@ -135,17 +132,18 @@ class _LostEnd:
 
     @cached_property
     def circles(self) -> list[Circle]:
-        """Circles seen nearly all round, by size."""
-        tried = [self.near(float(radius)) for radius in self.sizes()]
-        return [circle for circle in tried if circle is not None]
+        """Circles of all sizes seen nearly all round."""
+        return [circle for circle in map(self.near, self.sizes()) if circle is not None]
+
+    def as_large(self, radius: float) -> Circle | None:
+        """The first circle about as large as another end's."""
+        sizes = sorted(self.sizes(), key=lambda size: abs(size - radius))[:3]
+        circles = (circle for circle in map(self.near, sizes) if circle is not None)
+        return next((circle for circle in circles if abs(circle.radius - radius) <= SAME_RADIUS * radius), None)
 
     def ahead(self, circle: Circle) -> float:
         """Distance of a circle's centre from the end of the cable, in radii."""
         return float(np.hypot(*(np.array(circle.center) - self.end.place)) / circle.radius)
-
-    def on_rim(self, circle: Circle) -> bool:
-        """True if the cable is lost on this circle."""
-        return abs(self.ahead(circle) - 1.0) <= _END_ON_RIM
 
     def near(self, radius: float) -> Circle | None:
         """Circle of about some radius that is seen nearly all round."""
@@ -162,28 +160,20 @@ class _LostEnd:
         steps = int(np.ceil(np.log(high / low) / np.log(1.0 + SEARCH_RADII)))
         return np.asarray(np.geomspace(low, high, steps + 1) * self.width_px, np.float64)
 
-
-def _at_end(lost: _LostEnd) -> float | None:
-    """Radius of the smallest circle with the cable's end on its rim, or of a larger one about it that hides it too."""
-    at_end = [circle for circle in lost.circles if lost.on_rim(circle)]
-    if not at_end:
-        return None
-    rim = at_end[0]
-    for circle in at_end[1:]:
-        apart = np.hypot(*np.subtract(circle.center, rim.center))
-        wider = circle.radius > (1.0 + SAME_RADIUS) * rim.radius
-        if wider and apart <= SAME_AXIS_RADII * circle.radius and _hides(lost, rim, circle):
-            rim = circle
-    return rim.radius
+    def lost_under(self, circle: Circle, most: float) -> bool:
+        """True of a circle before which the cable is lost, ``most`` radii from its centre, or within it unseen."""
+        ahead = self.ahead(circle)
+        return ahead <= most and (ahead > 1.0 - SAME_RADIUS or _hides(self, circle))
 
 
-def _hides(lost: _LostEnd, inner: Circle, outer: Circle) -> bool:
-    """True if between two circles about one axis the cable looks as the rest of that ring does, not as outside it."""
+def _hides(lost: _LostEnd, outer: Circle) -> bool:
+    """True if between the end of a cable and a circle about it that looks as all round there does, not as outside."""
+    inner = lost.ahead(outer)
     way = lost.end.place - np.array(outer.center)
     toward = np.arctan2(way[1], way[0])
     half = 0.25 * lost.width_px / outer.radius  # the middle half of the cable: what is beside it is ground
     along = np.linspace(-half, half, 9)
-    between = inner.radius + np.array([0.35, 0.5, 0.65]) * (outer.radius - inner.radius)
+    between = outer.radius * (inner + np.array([0.35, 0.5, 0.65]) * (1.0 - inner))
     beyond = outer.radius + np.array([0.3, 0.5, 0.7]) * lost.width_px
     # Beside the cable by its whole width and more, where it hides nothing either; light from one side differs less.
     beside = np.linspace(4.0 * half, 4.0 * half + np.pi / 3.0, 30)
@@ -202,22 +192,3 @@ def _colour(photo: Photo, center: tuple[float, float], radii: Array, angles: Arr
     inside = (u >= 0) & (v >= 0) & (u < photo.size[0]) & (v < photo.size[1])
     values = photo.pixels[v[inside], u[inside]].reshape(np.count_nonzero(inside), -1)
     return np.asarray(medians(values, axis=0) if len(values) else np.zeros(photo.channels), float)
-
-
-def _common(ends: list[_LostEnd]) -> float | None:
-    """The largest circle that is seen beyond all ends, nearly all round, wherever each was lost before it.
-
-    White bands, letters and shadows hide the last of a cable. At one end it must be lost so near that the circle is no
-    dot, which lies farther ahead; the largest, for a bevel lies on the same axis.
-    """
-    for radius in sorted((circle.radius for circle in ends[0].circles), reverse=True):
-        alike = [_nearest(end, radius) for end in ends]
-        ahead = [end.ahead(circle) for end, circle in zip(ends, alike, strict=True) if circle is not None]
-        radii = _alike(None if circle is None else circle.radius for circle in alike)
-        if radii is not None and max(ahead) <= _LOST_CABLE_REACH and min(ahead) <= _LOST_BEFORE_RIM:
-            return median(radii)
-    return None
-
-
-def _nearest(lost: _LostEnd, radius: float) -> Circle | None:
-    return min(lost.circles, key=lambda circle: abs(circle.radius - radius), default=None)

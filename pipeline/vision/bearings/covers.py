@@ -28,7 +28,6 @@ from pipeline.vision.bearings.rim import (
     MIN_RIM,
     RADIUS_STD,
     SAME_RADIUS,
-    SEARCH_RADII,
     SURE_RIM,
     Circle,
     Radius,
@@ -40,12 +39,8 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
 from pipeline.vision.search.ends import CableEnd
 
-_INNER_DISC = 0.82
-"""Radii; bright middle of a cover whose rim is of the ground's look: sought between 0.72 and 0.92, smaller ones are
-marks, larger ones pass for the rim.
-"""
 _RING_WIDTH = 0.05  # radii; std of the ring that seeks centres: as well as the radius is known
-_MARK_RADII = 0.6  # radii of a cover; largest dot, screw or bevel that marks the axis of one not seen
+_MARK_RADII = 0.95  # radii of a cover; largest dot, screw, bevel or bright middle that marks the axis of one not seen
 _EXPECTED_REACH_RADII = 2.5
 """Radii; a cover of a neighbouring photo is sought again if the cable's end is so near: mostly it is one away, an end
 led astray by the cover's shadow two.
@@ -56,6 +51,10 @@ _MIN_SOFT_RIM = 0.5
 lost left 0.6, a moved camera, whose rim is doubled, 0.45.
 """
 _ASIDE_STD_RADII = 0.25  # radii; how far aside of the visible cable's direction the centre lies: bend under the cover
+_REACH_RADII = 4.1
+"""Radii; how far from where the cable's mask ends the centre of its cover may lie: a stub beyond it, or letters before
+it, are as long as a diameter.
+"""
 _SAME_COVER = 0.1  # radii; centres so near to each other, by rim and by cut, are those of one cover
 _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
 _CANDIDATES = 3  # best voted centres that are fitted; the rim decides among them
@@ -93,10 +92,11 @@ def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> 
     cut = cover_by_cut(photo, end, radius, width_px)
     if cut is not None and (found is None or _apart(found, cut) > _SAME_COVER):
         found = fit_circle(photo, np.array(cut.center), radius)
-        found = found if found is not None and found.rim >= MIN_RIM and _apart(found, cut) <= _SAME_COVER else None
+        least = MIN_RIM if found is not None and _apart(found, cut) <= _SAME_COVER else SURE_RIM
+        found = found if found is not None and found.rim >= least else None
     marked = _by_marks(photo, end, radius, found)
     if marked is None or cut is None:
-        return marked or _by_inner_disc(photo, end, radius, width_px) or cut
+        return marked or cut
     return cut if _apart(marked, cut) > _SAME_COVER else min(marked, cut, key=lambda circle: circle.std)
 
 
@@ -105,35 +105,24 @@ def _apart(one: Circle, other: Circle) -> float:
     return float(np.hypot(*np.subtract(one.center, other.center)) / other.radius)
 
 
-def _by_inner_disc(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
-    """Cover with a middle that stands out, all round, of a rim that does not: the middle tells the axis."""
-    inner = Radius(_INNER_DISC * radius.px, 0.5 * SEARCH_RADII)
-    if inner.px < width_px:  # the end of the cable itself passes for a disc that is little wider than it
-        return None
-    disc = find_rim(photo, end, inner, width_px)
-    if disc is None or disc.rim < SURE_RIM:
-        return None
-    return replace(disc, radius=radius.px, radius_std=0.1 * radius.px, marked=True)
-
-
 def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
     """As `find_cover`, by the rim alone: the first that is seen all round, else the largest part of one."""
-    # The centre lies between one diameter back and one diameter ahead of the mask's end.
-    window = _Window.cut(photo, end.place, 3.1 * radius.px, radius.px)
+    window = _Window.cut(photo, end.place, _REACH_RADII * radius.px, radius.px)
     if window is None:
         return None
     along, aside = _along_cable(window, end)
     fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
     prior = np.exp(-0.5 * (aside / (_ASIDE_STD_RADII * radius.px)) ** 2 - 0.5 * fall**2)
-    ahead = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2) * (along > 0.0)
+    anywhere = np.exp(-0.5 * (aside / (2.0 * _ASIDE_STD_RADII * radius.px)) ** 2)
     beside = np.abs(aside) < 0.8 * width_px
     # Mostly the mask ends at the rim and all behind it is cable.
-    # Where a block or a shadow hides the last of the cable, its mask ends early: a whole rim farther on is the cover's.
+    # Where a block or a shadow hides the last of the cable, its mask ends early, and where an arm looks like the cable
+    # it runs on beyond the cover: a whole rim farther on or farther back is the cover's.
     partial: Circle | None = None
     tries = (
         (along < 0.0, prior, 1.0, MIN_RIM),
         (along < 0.0, prior, _SOFT_RIM_PX, _MIN_SOFT_RIM),
-        (along < -np.inf, ahead, 1.0, SURE_RIM),
+        (along < -np.inf, anywhere, 1.0, SURE_RIM),
     )
     for blind, where, softness, least in tries:
         if softness > 1.0 and partial is not None:

@@ -183,10 +183,12 @@ def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, softne
     """Centre and radius near the first guess for which most of the circle lies on edges, to a twelfth of ``span``."""
     slopes = _radial_slopes(photo, parameters, ray, 1.5 * span, softness)
     step = span / 12.0
-    peak = np.sort(np.where(slopes.seen[:, None], slopes.strength, 0.0).max(axis=1))
-    usual = float(peak[len(peak) // 2]) + 1e-12
-    # Blurred to the step of the search; no direction counts more than the median one.
-    level = gaussian_filter1d(np.minimum(slopes.strength / usual, 1.0), step, axis=1) * slopes.seen[:, None]
+    strength = slopes.strength
+    peak = np.sort(np.where(slopes.seen[:, None], strength, 0.0).max(axis=1))
+    usual = float(peak[len(peak) // 4]) + 1e-12
+    # An edge is a place, however steep: beside a rim of little contrast a steeper one on the cover counts no more.
+    edges = np.where(_steepest(strength), np.minimum(strength / usual, 1.0), 0.0) * slopes.seen[:, None]
+    level = gaussian_filter1d(edges, 2.0 * step, axis=1)
     level, ray = level[::2], ray[::2]  # pooled with its neighbours, every second ray tells what all do
     shifts = np.arange(-12, 13) * step
     wider = np.clip(np.arange(-2, 3) * expected.std * expected.px, -0.5 * span, 0.5 * span)
@@ -212,14 +214,37 @@ def _radial_edges(slopes: _Slopes, span: float, softness: float) -> tuple[Array,
     """
     offsets, strength = slopes.offsets, slopes.strength
     inner = np.abs(offsets) <= span
-    place = np.argmax(np.where(inner, strength, 0.0), axis=1)
-    near = np.abs(np.arange(len(offsets)) - place[:, None]) <= 5 * softness
+    place = np.argmax(
+        np.where(inner & _steepest(strength), strength, 0.0) * np.exp(-2.0 * (offsets / span) ** 2), axis=1
+    )
+    near = _of_one_edge(strength, place, round(5 * softness))
     mass = np.where(near, strength - np.min(np.where(near, strength, np.inf), axis=1)[:, None], 0.0)
     edge = (mass @ offsets) / (mass.sum(axis=1) + 1e-12)
     peak = strength[np.arange(len(strength)), place]
     found = slopes.seen & (peak > RIM_OVER_TEXTURE * slopes.texture)
     usual = quantile(peak[found], 0.75) if found.any() else 1.0
     return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
+
+
+def _steepest(strength: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Places (rays, places) that are steeper than both neighbours."""
+    found = np.zeros(strength.shape, bool)
+    found[:, 1:-1] = (strength[:, 1:-1] >= strength[:, :-2]) & (strength[:, 1:-1] > strength[:, 2:])
+    return found
+
+
+def _of_one_edge(strength: NDArray[np.float32], place: NDArray[np.intp], most: int) -> NDArray[np.bool_]:
+    """Places (rays, places) within so many of the steepest one of each ray, as far as the slope falls from there."""
+    rays, near = np.arange(len(place)), np.zeros(strength.shape, bool)
+    near[rays, place] = True
+    for way in (-1, 1):
+        falling, last = np.ones(len(place), bool), strength[rays, place]
+        for k in range(1, most + 1):
+            there = np.clip(place + way * k, 0, strength.shape[1] - 1)
+            falling &= strength[rays, there] <= last
+            last = strength[rays, there]
+            near[rays[falling], there[falling]] = True
+    return near
 
 
 def _without_light(slopes: _Slopes, edge: Array) -> Array:

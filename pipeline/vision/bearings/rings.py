@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from pipeline.records import Array
@@ -32,6 +33,8 @@ SAME_AXIS_RADII = 0.03  # radii; a ring farther off was not turned on the axis: 
 _MARK_TRIES = 4  # roundest places where a mark is fitted: edges of cover and shadow pass for round ones
 _ASTRAY_RADII = 0.16  # radii; how far a rim that is not sure may lie off the centre: half a bevel
 _RING_RANGE = (0.1, 0.96)  # radii; where dots, grooves and bevels lie: below is a punch mark, above the rim
+_TURNED_RADII = 0.8  # radii; of what lies on a cover: its rim and the shade beside it are not compared
+_ALIKE_TURNED = 0.8  # correlation of a cover with itself turned by half a turn from which that is no chance
 _RINGS = 2  # rings of a cover that are fitted at most: the strongest tell the most
 
 
@@ -53,6 +56,7 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
     """
     whole = rim.rim >= SURE_RIM
     rings = _rings(photo, _roundest(photo, np.array(rim.center), expected.px), expected.px)
+    rings = rings or _turned_half(photo, rim, expected.px)
     if not rings:
         return rim
     apart = max(np.hypot(*np.subtract(ring.center, rim.center)) for ring in rings)
@@ -71,6 +75,36 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
     # What was taken for the rim is none, or part of one: the radius is the expected one.
     doubt = float(np.hypot(rim.radius_std, abs(rim.radius - expected.px)))
     return Circle((float(middle[0]), float(middle[1])), expected.px, std, doubt, rim.rim, agree)
+
+
+def _turned_half(photo: Photo, rim: Circle, radius: float) -> list[Circle]:
+    """The point about which what lies on a cover looks the same turned by half a turn; empty without such a point.
+
+    Quadrants, a cross or a slotted screw are not round: on circles about their centre there is no ring. The picture is
+    held against itself turned: where it fits best, both centres lie twice as far apart as the true one is off.
+    """
+    reach, half = max(2, round(_ASTRAY_RADII * radius)), int(_TURNED_RADII * radius)
+    low, (u, v) = np.rint(rim.center).astype(int) - half - 2 * reach, np.mgrid[-half : half + 1, -half : half + 1]
+    high = low + 2 * (half + 2 * reach) + 1
+    if half < 4 or (low < 0).any() or (high > photo.size).any():
+        return []
+    part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) / np.float32(photo.full_scale)
+    inner = slice(2 * reach, -2 * reach)
+    turned, disc = part[inner, inner][::-1, ::-1].copy(), (u**2 + v**2 <= half**2).astype(np.float32)
+    fit = cv2.matchTemplate(part, turned, cv2.TM_CCOEFF_NORMED, mask=disc)
+    row, column = np.unravel_index(int(np.argmax(fit)), fit.shape)
+    if not (fit[row, column] > _ALIKE_TURNED and 0 < row < len(fit) - 1 and 0 < column < len(fit) - 1):
+        return []
+    shift, curved = [], []
+    for before, at, after in (fit[row, column - 1 : column + 2], fit[row - 1 : row + 2, column]):
+        curved.append(float(2.0 * at - before - after))
+        shift.append(0.5 * float(after - before) / curved[-1])
+    off = np.array([column, row]) + shift - 2.0 * reach
+    # what does not fit is light from one side rather than noise: it tells as little as one line of values does
+    misfit = (1.0 - float(fit[row, column])) / half
+    std = float(np.hypot(0.5 * np.sqrt(misfit / min(curved)), CENTER_STD_FLOOR_PX))
+    center = low + half + 2 * reach + 0.5 * off
+    return [Circle((float(center[0]), float(center[1])), float(half), std, 0.1 * radius, 1.0)]
 
 
 def find_marks(photo: Photo, places: Array, reach: float) -> list[Circle]:

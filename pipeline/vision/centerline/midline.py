@@ -155,7 +155,7 @@ def measure_sections(
     place, std, good = _consistent(place, std, good, _EDGE_OUTLIER)
     keep = np.asarray(good.any(axis=1))
     keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width)
-    keep = _from_stretch_to_stretch(keep, keep & good.all(axis=1))
+    keep = _between_pairs(keep, keep & good.all(axis=1))
     if np.count_nonzero(keep) < LEAST_SECTIONS:
         return None
     s, place, std = s[keep], place[keep], std[keep]
@@ -216,21 +216,15 @@ def _of_usual_width(width: Array) -> NDArray[np.bool_]:
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))
 
 
-def _from_stretch_to_stretch(keep: NDArray[np.bool_], both: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The mask ``(k,)`` without single sections beyond its outermost stretches, and without ends of one edge.
+def _between_pairs(keep: NDArray[np.bool_], both: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The mask ``(k,)`` from the first to the last stretch of sections with both edges.
 
-    A pin on a block may be as wide as the cable, and one edge of a jaw that hides it may go on where the cable's did.
-    Such an end is longer than what stripes and shades leave of one edge farther in.
+    Farther in, one edge and the width tell the cable. Beyond, a pin on a block may be as wide as it, and one edge of a
+    jaw that hides it may go on where the cable's did.
     """
-    stretch = binary_opening(keep, np.ones(_TOGETHER, dtype=bool))
-    kept, shown = np.flatnonzero(stretch), np.flatnonzero(stretch & both)
-    if not len(shown):
-        return keep
-    longest = max(int(np.diff(shown).max(initial=0)), _TOGETHER)
-    first = shown[0] if shown[0] - kept[0] > longest else kept[0]
-    last = shown[-1] if kept[-1] - shown[-1] > longest else kept[-1]
+    shown = np.flatnonzero(binary_opening(both, np.ones(_TOGETHER, dtype=bool)))
     index = np.arange(len(keep))
-    return np.asarray(keep & (index >= first) & (index <= last))
+    return np.asarray(keep & (index >= shown[0]) & (index <= shown[-1])) if len(shown) else keep
 
 
 def _running_median(values: Array) -> Array:

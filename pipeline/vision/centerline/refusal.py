@@ -57,7 +57,7 @@ def refusal(
     told = (
         _another_width(middle, diameter, sections.softest * middle / median(sections.width))
         or (None if evidence.enough else unlike_a_cable(evidence))
-        or _uneven(fit, sections, middle)
+        or (None if evidence.bordered else _uneven(fit, sections, middle))
         or _beside_cover(rough, fit, chord, middle)
         or _bent(fit, middle)
     )
@@ -70,7 +70,7 @@ def _another_width(middle: float, diameter: float | None, blur: float) -> Messag
 
 
 def _uneven(fit: CurveFit, sections: Sections, middle: float) -> Message | None:
-    """Middles that lie about no smooth curve: what was followed are shades, not the edges of a cable."""
+    """Middles about no smooth curve where edges are not seen all along: shades, and no outline that waves."""
     width = median(sections.width)
     scatter = median(fit.point_std[fit.weight > 0.0]) * width / middle
     limit = max(_UNEVEN_PX, _UNEVEN * width)

@@ -211,4 +211,4 @@ def _along(photo: Photo, core: Array, ground: Array) -> Photo:
     grey = np.empty(photo.pixels.shape[:2], np.uint16)
     for rows in (slice(first, first + _ROWS) for first in range(0, len(grey), _ROWS)):
         grey[rows] = np.rint(cv2.transform(photo.pixels[rows].astype(np.float32), scaled) - 65535.0 * darkest)
-    return Photo(photo.name, grey, 16, _COLOUR_GRID_PX)
+    return Photo(photo.name, grey, 16, _COLOUR_GRID_PX, photo)

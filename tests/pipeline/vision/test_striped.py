@@ -5,6 +5,13 @@ import numpy as np
 import pytest
 
 from pipeline.records import Centerline, Rejected
+from pipeline.settings.vision.photo import PhotoSettings
+from pipeline.vision.bearings.covers import BearingHints
+from pipeline.vision.judgement import Cable
+from pipeline.vision.photo import load_photo
+from pipeline.vision.rough import RoughCable
+from pipeline.vision.search.backdrop import in_one_colour, stand_out
+from pipeline.vision.segmentation import find_cable
 from pipeline.vision.single import trace_photo
 
 TABLE, WHITE, BLUE = (150, 165, 175), (225, 225, 225), (160, 80, 40)
@@ -12,13 +19,22 @@ PAPER, GREEN, YELLOW = (235, 238, 238), (60, 120, 50), (90, 215, 225)
 WIDTH, FINER, SIZE = 14.0, 4, (810, 405)
 
 
-def drawn(folder, middles):
-    """Wires ``middles`` px beside a bow; beyond a sixth of the width from the first one's middle they are blue."""
+ENDS, COVER = (93.0, 716.0), 17.0
+
+
+def drawn(folder, middles, covers=None):
+    """Wires ``middles`` px beside a bow; beyond a sixth of the width from the first one's middle they are blue.
+
+    Covers of a colour lie on the ends of the bow.
+    """
     u, v = ((np.arange(n * FINER) + 0.5) / FINER - 0.5 for n in SIZE)
     t = (v[:, None] - bow(u)) / np.hypot(1.0, np.gradient(bow(u), u))
     inside = np.any([np.abs(t - middle) < 0.5 * WIDTH for middle in middles], axis=0) & (u > 93.0) & (u < 716.0)
     sheath = np.where((t > middles[0] + WIDTH / 6.0)[..., None], BLUE, WHITE)
-    return taken(folder, np.where(inside[..., None], sheath, TABLE))
+    picture = np.where(inside[..., None], sheath, TABLE)
+    for end in () if covers is None else ENDS:
+        picture[np.hypot(v[:, None] - bow(end), u - end) < COVER] = covers
+    return taken(folder, picture)
 
 
 def taken(folder, picture):
@@ -47,6 +63,35 @@ def test_a_wire_of_two_colours_is_one_cable(tmp_path):
     # the wider colour alone is a strip whose middle lies 2.3 px beside the wire's
     assert np.sqrt(np.mean(beside(line) ** 2)) < 0.5
     assert line.width_m == pytest.approx(WIDTH, rel=0.1)
+
+
+def test_covers_unseen_in_the_colour_of_a_wire_are_found(tmp_path):
+    """Along the direction of colour in which both stripes are alike these covers are as bright as the table."""
+    photo = load_photo(drawn(tmp_path, [0.0]), PhotoSettings())
+    one = in_one_colour(photo, stand_out(photo, 1))
+    assert one is not None
+    table = np.column_stack([photo.pixels.reshape(-1, 3), np.ones(photo.pixels.size // 3)]).astype(float)
+    weights = np.linalg.lstsq(table, one.pixels.ravel().astype(float), rcond=None)[0][:3]
+    across = np.cross(weights, np.cross(weights, (1.0, 0.0, -1.0)))
+    colour = np.array(TABLE) + 90.0 * across / np.abs(across).max()
+    known = Cable(WIDTH, 660.0, BearingHints(cover_px=2.0 * COVER))
+    found = find_cable(load_photo(drawn(tmp_path, [0.0], colour), PhotoSettings()), cable=known)
+    assert isinstance(found, RoughCable)
+    for axis, u in ((found.left, ENDS[0]), (found.right, ENDS[1])):
+        assert axis.sure
+        assert np.hypot(axis.center_px[0] - u, axis.center_px[1] - bow(u)) < 3.5 * axis.std_px < 0.7
+
+
+def test_a_bundle_whose_outline_waves_is_traced(tmp_path):
+    """Strands that wind about each other move both edges of what is seen to and fro, by a tenth of its width."""
+    u, v = ((np.arange(n * FINER) + 0.5) / FINER - 0.5 for n in SIZE)
+    t, width = (v[:, None] - bow(u)) / np.hypot(1.0, np.gradient(bow(u), u)), 26.0
+    upper, lower = (0.1 * width * np.sin(2.0 * np.pi * u / (turns * width)) for turns in (1.3, 0.9))
+    inside = (t > lower - 0.5 * width) & (t < upper + 0.5 * width) & (u > 93.0) & (u < 716.0)
+    line = trace_photo(taken(tmp_path, np.where(inside[..., None], GREEN, TABLE)), diameter_px=width)
+    assert isinstance(line, Centerline)
+    assert np.abs(np.median(beside(line))) < 0.1
+    assert np.sqrt(np.mean(beside(line) ** 2)) < 0.5
 
 
 def test_two_wires_are_not_one(tmp_path):
