@@ -18,6 +18,7 @@ A fit whitens its rows by the noise that is likeliest beforehand. What is known 
     rough     the same with 1 / k, at each step for itself, as the forces
     pattern   one wave sin(k pi s / L), or one bump at a place, or one bearing whose axis is elsewhere along or across
               the chord (a cover that slips), as large as it likes at each step
+    log       displacements off by more than any log scatters: photos taken before the drive stands still, say
 
 In whitened rows the covariance is
 
@@ -32,7 +33,7 @@ sizes cost a sum. Notation of the products: G grid points, o own columns, k adde
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -40,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtr
 
-from pipeline.diagnosis.fits.workbench import SCATTER
+from pipeline.diagnosis.posterior.products import Products, Spread, along, sums, with_rig
 from rod.inverse.common_errors import shared_light
 from rod.inverse.noise import by_axes, slow_errors
 from rod.inverse.observation import Observation, PhotoData
@@ -51,14 +52,9 @@ Forms = Callable[[Array], Array]
 
 SLOW = {1.0: 0.6, 0.3: 0.2, 3.0: 0.2}
 HOLD = {0.0: 0.7, 1.0: 0.3}
-AS_RIGS_ARE = (0.0, 1.0)
-MOVED = {(0.0, 0.0): 0.1, AS_RIGS_ARE: 0.6, (SCATTER, 1.0): 0.2, (5.0 * SCATTER, 1.0): 0.1}
 """Sizes and their probabilities beforehand: as stated is usual, more is not rare. Forces that are off by several
 standard deviations of a hold are something else: no band of f_EI may take them for noise unseen; by how much few
-samples may belie their noise is no matter of belief, see `hold_sizes`. `MOVED`: scatter of the displacements (m), and
-whether the rig is exact (0) or off by its standard deviations (1), all of it together: one that is exact in all but one
-thing is rarer than one that nobody aligned, and where displacements scatter nobody knows their zero better. An exact
-one is a simulation; where no photo at rest tells the zero, it is this number that decides how well K0 is known."""
+samples may belie their noise is no matter of belief, see `hold_sizes`."""
 
 SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
 """Of the cable's length: from below what any photo shows to a bow that is another experiment."""
@@ -83,13 +79,6 @@ SEEN = 0.03
 """Standard deviations: directions in which the largest something else adds less are left as they are."""
 
 
-class Spread(NamedTuple):
-    """Orthonormal directions ``turn`` (d, n) of rows along which something else adds the variances ``size`` (d,)."""
-
-    turn: Array
-    size: Array
-
-
 class Kind(NamedTuple):
     """A kind of something else: ``shapes`` for the first of `SLOW`, ``holds``, and pairs of positions in the sizes.
 
@@ -101,44 +90,6 @@ class Kind(NamedTuple):
     pairs: NDArray[np.int_]
     chance: float
     noise: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Products:
-    """Sums over whitened rows for every error model.
-
-    Attributes
-    ----------
-    own : (G, o, o)
-        ``M' C^-1 M`` of the own columns; prior knowledge and, last, the displacements in it.
-    cross : (G, o, k)
-        Of own and added columns.
-    square : (G, k)
-        Of each added column.
-    log_det : (G,)
-        Of C.
-    log_prior : (G,)
-        Probability of the error model, given whether there is something else.
-    rest : (G,) bool
-        Whether there is something else.
-    scales : (G, m + r)
-        Sizes of errors of the displacements (m) and of the rig.
-    sizes : (G, 5)
-        Positions of the error model: in `SLOW`, among the kinds, in `HOLD`, `SHAPES` and `FORCES`.
-    """
-
-    own: Array
-    cross: Array
-    square: Array
-    log_det: Array
-    log_prior: Array
-    rest: NDArray[np.bool_]
-    scales: Array
-    sizes: NDArray[np.int_]
-
-    def at(self, kept: NDArray[np.int_]) -> Products:
-        """Those of some error models."""
-        return Products(*(getattr(self, field.name)[kept] for field in fields(self)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,18 +135,18 @@ class ErrorGrid:
         own, force = columns.shape[1] + extra, whole[self.forces]
         prior = np.zeros((own, own))
         prior[: own - extra, : own - extra] = known.T @ known
-        fixed = _sums(force, own)
+        fixed = sums(force, own)
         fixed[: own * own] += prior.ravel()
         tables, log_det, log_prior, sizes = [], [], [], []
         for slow, root, det, chance in zip(range(len(SLOW)), self.roots, self.log_det, SLOW.values(), strict=True):
             photo = root @ whole[self.photos]
-            by_slow = fixed + _sums(photo, own)
+            by_slow = fixed + sums(photo, own)
             for number, kind in enumerate(self.kinds):
                 if slow >= len(kind.shapes):
                     continue
                 a, b = kind.pairs.T
-                shape, shape_det = _along(kind.shapes[slow], photo, np.zeros(1), np.array(SHAPES), own)
-                held, held_det = _along(kind.holds, force, np.array([*self.hold]), np.array(FORCES), own)
+                shape, shape_det = along(kind.shapes[slow], photo, np.zeros(1), np.array(SHAPES), own)
+                held, held_det = along(kind.holds, force, np.array([*self.hold]), np.array(FORCES), own)
                 tables.append((held[:, b] + shape[:, a] + by_slow).reshape(-1, fixed.size))
                 log_det.append((held_det[:, b] + shape_det[:, a] + det).ravel())
                 share = (chance if len(kind.shapes) > 1 else 1.0) * kind.chance / len(a)
@@ -214,7 +165,7 @@ class ErrorGrid:
             scales=np.zeros((len(table), extra)),
             sizes=positions,
         )
-        return _with_rig(found, displacements.shape[1], self.rig.shape[1])
+        return with_rig(found, displacements.shape[1], self.rig.shape[1])
 
     def something_else(self, position: NDArray[np.int_], rows: Array) -> Array:
         """What is likeliest of whitened rows (N,) to be something else, as large as an error model (5,) says."""
@@ -228,46 +179,6 @@ class ErrorGrid:
         means = in_forces / (1.0 + [*self.hold][hold] ** 2 + in_forces) * (held.turn @ rows[self.forces])
         found[self.forces] = held.turn.T @ means
         return found
-
-
-def _along(spread: Spread, rows: Array, common: Array, sizes: Array, own: int) -> tuple[Array, Array]:
-    """What other variances along some directions change: sums (c, a, T) and log-determinants (c, a)."""
-    wide = 1.0 + common[:, None, None] ** 2 + sizes[None, :, None] ** 2 * spread.size
-    turned = spread.turn @ rows
-    change = (1.0 / wide - 1.0).reshape(len(common) * len(sizes), len(spread.size))
-    mine, added = turned[:, :own], turned[:, own:]
-    pairs = (np.einsum("ni,nj->nij", mine, other).reshape(len(turned), own * other.shape[1]) for other in (mine, added))
-    found = change @ np.hstack([*pairs, added**2])
-    return found.reshape(*wide.shape[:-1], -1), np.log(wide).sum(axis=-1)
-
-
-def _sums(rows: Array, own: int) -> Array:
-    """Sums (T,) over rows (n, c): own by own columns, own by added ones, added ones squared; flat."""
-    both = rows[:, :own].T @ rows
-    return np.concatenate([both[:, :own].ravel(), both[:, own:].ravel(), np.sum(rows[:, own:] ** 2, axis=0)])
-
-
-def _with_rig(fixed: Products, displacements: int, rig: int) -> Products:
-    """The products with displacements that scatter, and a rig that is off, by each of `MOVED`, in units of it."""
-    sizes, chances = np.array([*MOVED]), np.array([*MOVED.values()])
-    extra, among = displacements + rig, np.flatnonzero(fixed.rest)
-    count = fixed.own.shape[1] - extra
-    # something else is among a rig as rigs are, and holds what displacements scatter
-    models = [np.flatnonzero(~fixed.rest)] * len(sizes) + [among]
-    which = np.repeat([*range(len(sizes)), [*MOVED].index(AS_RIGS_ARE)], [len(own) for own in models])
-    at = np.concatenate(models)
-    scales = np.hstack([np.ones((len(sizes), count)), np.repeat(sizes, (displacements, rig), axis=1)])[which]
-    by = scales[:, :, None]
-    return Products(
-        own=fixed.own[at] * (by * scales[:, None, :]) + np.diag(np.r_[np.zeros(count), np.ones(extra)]),
-        cross=fixed.cross[at] * by,
-        square=fixed.square[at],
-        log_det=fixed.log_det[at],
-        log_prior=fixed.log_prior[at] + np.where(fixed.rest[at], 0.0, np.log(chances)[which]),
-        rest=fixed.rest[at],
-        scales=scales[:, count:],
-        sizes=fixed.sizes[at],
-    )
 
 
 def error_grid(observation: Observation, facts: Facts, rig: Array) -> ErrorGrid:

@@ -125,17 +125,30 @@ def _summed(grid: ErrorGrid, fitted: Fit, terms: Sequence[Term], solved: Solved)
     return found
 
 
-def something_else(grid: ErrorGrid, fitted: Fit) -> Array:
-    """What beside a fit is likeliest to be something else, as whitened rows (n,) of the data."""
+class SomethingElse(NamedTuple):
+    """What beside a fit is likeliest to be something else: whitened rows (n,) of the data.
+
+    ``astray``: what displacements are off by where that is it (root mean square, m); 0 where it is something else.
+    """
+
+    rows: Array
+    astray: float
+
+
+def something_else(grid: ErrorGrid, fitted: Fit) -> SomethingElse:
+    """What beside a fit is likeliest to be something else."""
     solved = solved_alone(grid, fitted)
     weight = np.where(solved.products.rest, mean_over_laws(solved.flat)[:, 0] + solved.products.log_prior, -np.inf)
     best = int(np.argmax(weight))
     data, (residual, jacobian) = len(grid.photos) + len(grid.forces), fitted.as_logged
     move = conditional(solved, solved.flat, np.array([best]))[0][0]
     size, beside = jacobian.shape[1], np.hstack([fitted.jacobian[:data, fitted.beyond_log], grid.rig])
-    moved = beside @ (solved.products.scales[best] * move[size:])
-    left = residual[:data] - jacobian[:data] @ move[:size] - moved
-    return grid.something_else(solved.products.sizes[best], left)
+    by = solved.products.scales[best] * move[size:]
+    own = by[: len(fitted.beyond_log)]
+    if np.any(own):
+        return SomethingElse(beside[:, : own.size] @ own, float(np.sqrt(np.mean(own**2))))
+    left = residual[:data] - jacobian[:data] @ move[:size] - beside @ by
+    return SomethingElse(grid.something_else(solved.products.sizes[best], left), 0.0)
 
 
 class Moments(NamedTuple):

@@ -17,7 +17,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.posterior.error_grid import ErrorGrid, Products
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid
+from pipeline.diagnosis.posterior.products import Products
 from rod.inverse.fit import Fit
 from rod.law_prior import Conditioned, conditioned
 

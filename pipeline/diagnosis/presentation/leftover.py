@@ -15,7 +15,7 @@ from rod.inverse.fit import Fit
 def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
     """Say where in the data that is which is likeliest to be something else."""
     observation, fitted = bench.observation, conclusion.fitted(bench)
-    field = something_else(conclusion.grid, fitted)
+    field, astray = something_else(conclusion.grid, fitted)
     begun = _begun(bench, fitted)
     found = whereabouts(observation, field)
     step = bench.test.steps[found.step]
@@ -23,6 +23,8 @@ def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
     placed = found.place is not None and loudest == "shape"
     place = Message("left.place", at_m=found.place) if placed else ""
     said = begun or Message("left.over", where=f"{loudest}s", step=step.step, branch=step.branch, place=place)
+    if astray and not begun:
+        said = Message("left.astray", size_m=astray, step=step.step, branch=step.branch)
     return LeftoverPart(
         **LeftoverPart.told(said),
         probability=conclusion.posterior.total(something_else=True),

@@ -94,6 +94,7 @@ def present(
     photos, forces = left_out(bench)
     before = bench.base if shown is None or accepted else shown
     spots = blind_spots(bench, seen, settings)
+    by_chance = leftover.key == "left.astray" or (accepted is not None and accepted.begun)
     return DiagnosisPart(
         verdict=word,
         **DiagnosisPart.told(sentence),
@@ -103,7 +104,9 @@ def present(
         table=rows,
         gain=gain,
         blind_spots=spots,
-        next_experiment=what_next(bench, conclusion, settings, spots=spots, unexplained=word == "unexplained"),
+        next_experiment=what_next(
+            bench, conclusion, settings, spots=spots, unexplained=word == "unexplained", by_chance=by_chance
+        ),
         extended=extended,
         extended_refuted=refuted,
         widening=wider if extended is None or refuted else None,
@@ -145,17 +148,17 @@ def what_next(
     *,
     spots: list[BlindSpot],
     unexplained: bool,
+    by_chance: bool,
 ) -> NextExperiment | None:
     """What separates the names that are confused; without any, what tells most about what these data cannot show.
 
     In this order: a class can be settled, a misfit without a name needs a second look at the same cable, a test without
-    unloading hides whole causes, and the force calibration is never seen.
+    unloading hides whole causes, and the force calibration is never seen. What came ``by_chance`` need not come again.
     """
     if conclusion.accepted is not None and conclusion.rivals and not unexplained:
         return next_experiment(bench, conclusion.accepted, conclusion.rivals, settings)
     if unexplained:
-        chance = conclusion.accepted is not None and conclusion.accepted.begun  # what began may not begin there again
-        look = "next.repeat" if chance else "next.turn" if bench.facts.returns else "next.turn-unload"
+        look = "next.repeat" if by_chance else "next.turn" if bench.facts.returns else "next.turn-unload"
         return NextExperiment(**NextExperiment.told(Message(look)), separates=[])
     if not bench.facts.returns:
         hidden = ["bearing_friction", "hysteresis", "plastic_set"]

@@ -106,3 +106,18 @@ def test_a_wrong_zero_that_presses_a_cable_over_to_its_other_side():
     assert (part.verdict, [cause.name for cause in part.causes]) == ("named", ["displacement_offset"])
     found = part.causes[0]  # offset and K0 act as one on the chord at rest, so the band is wide
     assert found.unit == "m" and abs(found.estimate - 2e-4) < 2.0 * found.std < 1e-4
+
+
+def test_photos_taken_before_the_drive_stood_still_are_no_cause():
+    """The forces are those at rest; half of the photos show the bearing up to 0.4 mm before its place."""
+    late = np.array([0.0, 0.0, 4e-4, 0.0, 1.5e-4, 0.0, 3.5e-4]) / LARGEST
+    at_rest = hidden_test(Cable(), SIX, largest=LARGEST, seed=33)
+    before = replace(SIX, shares=tuple((np.array(SIX.shares) - late).tolist()))
+    seen = hidden_test(Cable(), before, largest=LARGEST, seed=33)
+    steps = (
+        replace(step, chord=other.chord, shape=other.shape)
+        for step, other in zip(at_rest.steps, seen.steps, strict=True)
+    )
+    part, *_ = diagnose(faults_of_input(replace(at_rest, steps=tuple(steps))), None, SETTINGS)
+    assert part.verdict == "unexplained"
+    assert part.leftover.key == "left.astray" and part.next_experiment.key == "next.repeat"

@@ -1,0 +1,116 @@
+"""Sums over whitened rows for every error model: what an evidence needs of the data.
+
+For the notation see `pipeline.diagnosis.posterior.error_grid`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.diagnosis.fits.workbench import SCATTER
+
+Array = NDArray[np.float64]
+
+AS_RIGS_ARE = (0.0, 1.0)
+MOVED = {(0.0, 0.0): 0.1, AS_RIGS_ARE: 0.6, (SCATTER, 1.0): 0.2, (5.0 * SCATTER, 1.0): 0.1}
+"""Scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1), all of it
+together, with probabilities beforehand: one that is exact in all but one thing is rarer than one that nobody aligned,
+and where displacements scatter nobody knows their zero better. An exact one is a simulation; where no photo at rest
+tells the zero, it is this number that decides how well K0 is known."""
+
+ASTRAY, ITS_SHARE = (20.0 * SCATTER, 100.0 * SCATTER), 0.25
+"""Scatter of displacements, m, that no log has, and its probability among the four kinds of something else."""
+
+
+class Spread(NamedTuple):
+    """Orthonormal directions ``turn`` (d, n) of rows along which something else adds the variances ``size`` (d,)."""
+
+    turn: Array
+    size: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Sums over whitened rows for every error model.
+
+    Attributes
+    ----------
+    own : (G, o, o)
+        ``M' C^-1 M`` of the own columns; prior knowledge and, last, the displacements in it.
+    cross : (G, o, k)
+        Of own and added columns.
+    square : (G, k)
+        Of each added column.
+    log_det : (G,)
+        Of C.
+    log_prior : (G,)
+        Probability of the error model, given whether there is something else.
+    rest : (G,) bool
+        Whether there is something else.
+    scales : (G, m + r)
+        Sizes of errors of the displacements (m) and of the rig.
+    sizes : (G, 5)
+        Positions of the error model: in `SLOW`, among the kinds, in `HOLD`, `SHAPES` and `FORCES`.
+    """
+
+    own: Array
+    cross: Array
+    square: Array
+    log_det: Array
+    log_prior: Array
+    rest: NDArray[np.bool_]
+    scales: Array
+    sizes: NDArray[np.int_]
+
+    def at(self, kept: NDArray[np.int_]) -> Products:
+        """Those of some error models."""
+        return Products(*(getattr(self, field.name)[kept] for field in fields(self)))
+
+
+def along(spread: Spread, rows: Array, common: Array, sizes: Array, own: int) -> tuple[Array, Array]:
+    """What other variances along some directions change: sums (c, a, T) and log-determinants (c, a)."""
+    wide = 1.0 + common[:, None, None] ** 2 + sizes[None, :, None] ** 2 * spread.size
+    turned = spread.turn @ rows
+    change = (1.0 / wide - 1.0).reshape(len(common) * len(sizes), len(spread.size))
+    mine, added = turned[:, :own], turned[:, own:]
+    pairs = (np.einsum("ni,nj->nij", mine, other).reshape(len(turned), own * other.shape[1]) for other in (mine, added))
+    found = change @ np.hstack([*pairs, added**2])
+    return found.reshape(*wide.shape[:-1], -1), np.log(wide).sum(axis=-1)
+
+
+def sums(rows: Array, own: int) -> Array:
+    """Sums (T,) over rows (n, c): own by own columns, own by added ones, added ones squared; flat."""
+    both = rows[:, :own].T @ rows
+    return np.concatenate([both[:, :own].ravel(), both[:, own:].ravel(), np.sum(rows[:, own:] ** 2, axis=0)])
+
+
+def with_rig(fixed: Products, displacements: int, rig: int) -> Products:
+    """The products with displacements that scatter, and a rig that is off, by each of `MOVED`, in units of it.
+
+    Something else is among a rig as rigs are, and holds what displacements scatter; or it is these that are astray.
+    """
+    plain, rest = np.flatnonzero(~fixed.rest), np.flatnonzero(fixed.rest)
+    astray = [(size, AS_RIGS_ARE[1]) for size in ASTRAY] if displacements and rest.size else []
+    models = [(size, chance, plain) for size, chance in MOVED.items()]
+    models += [(AS_RIGS_ARE, 1.0 - ITS_SHARE * bool(astray), rest)]
+    models += [(size, ITS_SHARE / len(astray), plain) for size in astray]
+    lengths, at = [len(rows) for *_, rows in models], np.concatenate([rows for *_, rows in models])
+    which, extra = np.repeat(np.arange(len(models)), lengths), displacements + rig
+    count = fixed.own.shape[1] - extra
+    sizes = np.repeat(np.array([size for size, *_ in models]), (displacements, rig), axis=1)
+    scales = np.hstack([np.ones((len(models), count)), sizes])[which]
+    by = scales[:, :, None]
+    return Products(
+        own=fixed.own[at] * (by * scales[:, None, :]) + np.diag(np.r_[np.zeros(count), np.ones(extra)]),
+        cross=fixed.cross[at] * by,
+        square=fixed.square[at],
+        log_det=fixed.log_det[at],
+        log_prior=fixed.log_prior[at] + np.log([chance for _, chance, _ in models])[which],
+        rest=which >= len(MOVED),
+        scales=scales[:, count:],
+        sizes=fixed.sizes[at],
+    )
