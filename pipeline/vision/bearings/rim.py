@@ -89,7 +89,7 @@ def fit_circle(
     reach = max(3.0, NEAR_RADII * radius)
     for beside in (False, True):
         slopes = _radial_slopes(photo, parameters, ray, reach, softness, one_sign=on_cover)
-        edge, trust = _radial_edges(slopes, reach, softness)
+        edge, trust, foremost = _radial_edges(slopes, reach, softness)
         if beside and not on_cover:
             edge = _without_light(slopes, edge)
         fitted = _robust_circle(parameters, ray, edge, trust, reach, expected)
@@ -97,7 +97,7 @@ def fit_circle(
             return None
         before, (parameters, covariance) = parameters, fitted
     miss = np.hypot(*(before[:2] + (before[2] + edge)[:, None] * ray - parameters[:2]).T) - parameters[2]
-    rim = float(np.mean(np.abs(miss) < max(0.75, _RIM_TOLERANCE * radius)))
+    rim = float(np.mean((np.abs(miss) < max(0.75, _RIM_TOLERANCE * radius)) & foremost))
     off, other = np.hypot(*(parameters[:2] - center)), abs(parameters[2] - radius)
     concentric = other > max(4.0 * expected.std * radius, 1.0)
     if off > 0.5 * radius or (concentric and (rim < SURE_RIM or other > 1.2 * span)):
@@ -206,8 +206,11 @@ def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, softne
     return found
 
 
-def _radial_edges(slopes: _Slopes, span: float, softness: float) -> tuple[Array, Array]:
+def _radial_edges(slopes: _Slopes, span: float, softness: float) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Radius of the edge in each direction relative to the circle, NaN where none stands out, and its weight.
+
+    Of several edges it is one near the circle, since a cover may have steeper ones; third: whether none there is, for
+    of chance edges some are near any circle.
 
     The variance of an edge falls with the square of its slope; a soft shadow beside a rim of little contrast would
     else pass for the rim.
@@ -223,7 +226,8 @@ def _radial_edges(slopes: _Slopes, span: float, softness: float) -> tuple[Array,
     peak = strength[np.arange(len(strength)), place]
     found = slopes.seen & (peak > RIM_OVER_TEXTURE * slopes.texture)
     usual = quantile(peak[found], 0.75) if found.any() else 1.0
-    return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0)
+    foremost = place == np.argmax(np.where(inner, strength, 0.0), axis=1)
+    return np.where(found, edge, np.nan), np.minimum((peak / usual) ** 2, 1.0), foremost
 
 
 def _steepest(strength: NDArray[np.float32]) -> NDArray[np.bool_]:
