@@ -26,7 +26,6 @@ from pipeline.vision.search.beyond import (
     followed_in,
     goes_on_at,
     rest_faced_at,
-    short_of_axis,
 )
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
@@ -108,9 +107,6 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
         if branching:  # which of its arms leaves the picture nobody can tell
             return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
         return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
-    short = short_of_axis(standout, cut, axes)
-    if short is not None:
-        return refused_at(photo, "photo/hidden-end.goes-on", short)
     path = lead_to_axes(standout, strip.path, reading.width, axes)
     cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
     if not len(cut.seen_widths):
