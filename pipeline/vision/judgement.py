@@ -157,10 +157,7 @@ def _axes(
     if cable.bearings.cover_widths is not None and len(cut.seen_widths):
         width = cut.usual_width * standout.reduction  # the mask is wider by the shadow, covers would be
     cover = cable.bearings.cover_radius(width)
-    ends = (
-        find_end(strip.path[::-1], reading, standout, cover),
-        find_end(strip.path, reading, standout, cover),
-    )
+    ends = (find_end(strip.path[::-1], reading, standout), find_end(strip.path, reading, standout))
     leaving = [end.place for end in ends if at_border(end.place, photo, standout.reduction, width)]
     if leaving and cover is None and cable.bearings.given_px is None:
         return refused_at(photo, "photo/leaves-frame", leaving[0])

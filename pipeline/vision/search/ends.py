@@ -41,15 +41,10 @@ class CableEnd:
     at_object: bool = False
 
 
-def find_end(path: Array, reading: Reading, standout: Standout, cover_radius_px: float | None) -> CableEnd:
-    """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins.
-
-    A cover hardly wider than the cable stays part of the strip and bends its skeleton; there the piece that is led
-    straight begins a cover's radius earlier.
-    """
+def find_end(path: Array, reading: Reading, standout: Standout) -> CableEnd:
+    """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins."""
     width = reading.width
     trimmed = _TRIMMED_WIDTHS * width
-    trimmed = trimmed if cover_radius_px is None else max(trimmed, 1.2 * cover_radius_px / standout.reduction)
     body, outward = straight_body(path, width, trimmed)
     place, at_object = body[-1], False
     for step in np.arange(0.0, trimmed + 2.0 * width, 0.5):
