@@ -1,4 +1,4 @@
-"""Medians that are NaN, and no warning, where there are no values; robust standard deviations and fits by them."""
+"""Medians that are NaN, and no warning, where there are no values; the robust standard deviation by them."""
 
 from __future__ import annotations
 
@@ -31,19 +31,3 @@ def quantile(values: NDArray[Any], share: float) -> float:
 def scatter(values: NDArray[Any], about: float | None = None) -> float:
     """Robust standard deviation of all values about their median, or ``about`` a number."""
     return MAD_TO_STD * median(np.abs(values - (median(values) if about is None else about)))
-
-
-def robust_fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coefficients ``(k,)`` of the combination of ``terms`` (n, k) that most of ``values`` (n,) follow.
-
-    Least squares with Tukey's biweight, zero beyond 4.685 standard deviations: a twentieth less sure than without.
-    """
-    off = values - median(values)
-    coefficients: NDArray[np.float64] = np.zeros(terms.shape[1])
-    for _ in range(8):
-        weight = np.clip(1.0 - (off / (4.685 * scatter(off, 0.0) + 1e-12)) ** 2, 0.0, None) ** 2
-        weighted = terms * weight[:, None]
-        normal = weighted.T @ terms + 1e-9 * np.eye(terms.shape[1])
-        coefficients = np.asarray(np.linalg.solve(normal, weighted.T @ values), np.float64)
-        off = values - terms @ coefficients
-    return coefficients

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.vision.median import MAD_TO_STD, medians, robust_fit
+from pipeline.vision.median import MAD_TO_STD, median, medians, scatter
 from pipeline.vision.photo import Photo, reduce_area
 
 Image = NDArray[np.float32]
@@ -120,7 +120,7 @@ def _above_ground(small: Image) -> Image:
     u, v = np.vander(_centred(width), 3, increasing=True), np.vander(_centred(height), 3, increasing=True)
     by_row = np.empty((3, width, channels), np.float32)  # of each power of v
     for channel in range(channels):
-        c = robust_fit(terms, coarse[:, channel].astype(np.float64))  # cable and objects are none of the ground
+        c = _robust_fit(terms, coarse[:, channel].astype(np.float64))
         by_row[..., channel] = np.array([[c[0], c[1], c[3]], [c[2], c[4], 0.0], [c[5], 0.0, 0.0]]) @ u.T
     # one matrix product for all channels: the surface in one pass over the picture, not six
     surface: Image = (v.astype(np.float32) @ by_row.reshape(3, -1)).reshape(small.shape)
@@ -130,6 +130,19 @@ def _above_ground(small: Image) -> Image:
 
 def _centred(count: int) -> Array:
     return np.asarray((np.arange(count) + 0.5) / count * 2.0 - 1.0)
+
+
+def _robust_fit(terms: Array, values: Array) -> Array:
+    """Least squares with Tukey's biweight: cable and objects are outliers of the ground."""
+    coefficients = np.zeros(6)
+    coefficients[0] = median(values)
+    for _ in range(8):
+        residual = values - terms @ coefficients
+        spread = scatter(residual, 0.0) + 1e-6
+        weight = np.clip(1.0 - (residual / (4.685 * spread)) ** 2, 0.0, None) ** 2  # zero beyond 4.685 sigma
+        normal = terms.T @ (weight[:, None] * terms) + 1e-9 * np.eye(6)
+        coefficients[:] = np.linalg.solve(normal, terms.T @ (weight * values))
+    return coefficients
 
 
 def _covariance(residual: Image) -> Array:
