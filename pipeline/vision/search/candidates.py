@@ -39,7 +39,7 @@ _JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the m
 _MIN_BRANCH_WIDTHS = 2.5  # widths; shorter spurs of the skeleton come from the mask's rim, longer ones are branches
 _JUNCTION_WIDTHS = 3.5  # widths; strips' ends that meet at a crossing are so near
 _TOUCHING_WIDTHS = 2.0  # widths; an end nearer than that to the middle of another strip as wide touches it
-_LOWER_LEVEL = 0.5  # of Otsu's level, which is tried last: texture and other things may push it up
+_LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next: texture may push it up or down
 _LOWEST_LEVEL = 3.0  # sigmas of the ground; the last level that is tried, below it noise makes strips
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
 _MAX_COVERED_SHARE = 0.5  # share of the photo; a mask that covers more is ground, not cable
@@ -142,7 +142,7 @@ def approaches_itself(path: Array, width: float) -> bool:
 def _levels(standout: Standout) -> list[float]:
     """Levels in ground sigmas, the likeliest first."""
     otsu, *higher = standout.levels
-    others = (*higher, _LOWER_LEVEL * otsu)
+    others = (*higher, *(factor * otsu for factor in _LEVEL_FACTORS))
     return [otsu, *(level for level in others if level > _LOWEST_LEVEL)]
 
 
