@@ -26,7 +26,6 @@ from pipeline.vision.search.beyond import (
     followed_in,
     goes_on_at,
     rest_faced_at,
-    short_of_axis,
 )
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
 from pipeline.vision.search.closeup import Closeup, take_closeup
@@ -108,9 +107,6 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
         if branching:  # which of its arms leaves the picture nobody can tell
             return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
         return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
-    short = short_of_axis(standout, cut, axes)
-    if short is not None:
-        return refused_at(photo, "photo/hidden-end.goes-on", short)
     path = lead_to_axes(standout, strip.path, reading.width, axes)
     cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
     if not len(cut.seen_widths):
@@ -161,10 +157,7 @@ def _axes(
     if cable.bearings.cover_widths is not None and len(cut.seen_widths):
         width = cut.usual_width * standout.reduction  # the mask is wider by the shadow, covers would be
     cover = cable.bearings.cover_radius(width)
-    ends = (
-        find_end(strip.path[::-1], reading, standout, cover),
-        find_end(strip.path, reading, standout, cover),
-    )
+    ends = (find_end(strip.path[::-1], reading, standout), find_end(strip.path, reading, standout))
     leaving = [end.place for end in ends if at_border(end.place, photo, standout.reduction, width)]
     if leaving and cover is None and cable.bearings.given_px is None:
         return refused_at(photo, "photo/leaves-frame", leaving[0])

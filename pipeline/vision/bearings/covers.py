@@ -55,7 +55,6 @@ _REACH_RADII = 4.1
 """Radii; how far from where the cable's mask ends the centre of its cover may lie: a stub beyond it, or letters before
 it, are as long as a diameter.
 """
-_SAME_COVER = 0.1  # radii; centres so near to each other, by rim and by cut, are those of one cover
 _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
 _CANDIDATES = 3  # best voted centres that are fitted; the rim decides among them
 
@@ -90,19 +89,11 @@ def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> 
     if found is not None and found.rim >= SURE_RIM:
         return with_rings(photo, found, radius)
     cut = cover_by_cut(photo, end, radius, width_px)
-    if cut is not None and (found is None or _apart(found, cut) > _SAME_COVER):
+    if cut is not None and found is None:
         found = fit_circle(photo, np.array(cut.center), radius)
-        least = MIN_RIM if found is not None and _apart(found, cut) <= _SAME_COVER else SURE_RIM
-        found = found if found is not None and found.rim >= least else None
-    marked = _by_marks(photo, end, radius, found)
-    if marked is None or cut is None:
-        return marked or cut
-    return cut if _apart(marked, cut) > _SAME_COVER else min(marked, cut, key=lambda circle: circle.std)
-
-
-def _apart(one: Circle, other: Circle) -> float:
-    """Distance of two circles' centres in radii."""
-    return float(np.hypot(*np.subtract(one.center, other.center)) / other.radius)
+        found = found if found is not None and found.rim >= MIN_RIM else None
+    known = [one for one in (_by_marks(photo, end, radius, found), cut) if one is not None]
+    return min(known, key=lambda circle: circle.std, default=None)
 
 
 def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:

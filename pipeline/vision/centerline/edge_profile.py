@@ -27,11 +27,6 @@ from pipeline.vision.median import MAD_TO_STD, median, medians, quantile
 Float32 = NDArray[np.float32]
 Real = TypeVar("Real", Array, Float32)
 
-_TABLE_REACH, _TABLE_STEPS = 8, 64  # blurs, and entries a blur: linear between them leaves 7e-6 of the step
-_TABLE = ndtr(np.arange(-_TABLE_REACH * _TABLE_STEPS, _TABLE_REACH * _TABLE_STEPS + 1) / _TABLE_STEPS).astype(
-    np.float32
-)
-_TABLE_RISE = np.append(np.diff(_TABLE), np.float32(0.0))
 _BIN = 0.25  # px; pixels are pooled at this width of offset: widens the blur by 0.4 % at 0.8 px
 _MIN_BLUR = 0.30  # px; the pixel's own box is 0.29
 _PIXEL_OUTLIER = 4.0
@@ -114,45 +109,11 @@ def profile(offset: Real, place: Real, blur: Real) -> tuple[Real, Real, Real, Re
     return cumulative, -inside, outside, density / blur
 
 
-def _tabled(z: Float32) -> Float32:
-    """Normal distribution function of single pixels: many, and none tells more than a table does."""
-    place = z * np.float32(_TABLE_STEPS)
-    place += np.float32(_TABLE_REACH * _TABLE_STEPS)
-    np.clip(place, 0.0, len(_TABLE) - 1.0, out=place)
-    low = place.astype(np.intp)
-    place -= low
-    place *= _TABLE_RISE[low]
-    place += _TABLE[low]
-    return place
-
-
-def _shaded(
-    offset: Float32, place: Float32, blur: Float32, step: Float32, ramps: tuple[Float32, Float32]
-) -> tuple[Float32, Float32]:
-    """``A Phi + b_in R_in + b_out R_out`` and its slope in t, of single pixels; ``ramps`` are ``b_in`` and ``b_out``.
-
-    As `profile`, in few passes over many pixels: ``R_in = w z - R_out``.
-    """
-    inside, bend = ramps[0], ramps[1] - ramps[0]
-    z = offset - place
-    z *= 1.0 / blur
-    shape = _tabled(z)
-    density = z * z
-    density *= np.float32(-0.5)
-    np.exp(density, out=density)
-    density *= np.float32(1.0 / np.sqrt(2.0 * np.pi))
-    slope = bend * shape
-    slope += inside
-    ramp = z * shape
-    ramp += density
-    ramp *= bend * blur
-    shape *= step
-    shape += ramp
-    z *= inside * blur
-    shape += z
-    density *= step / blur
-    slope += density
-    return shape, slope
+def _shaded(offset: Real, place: Real, blur: Real, step: Real, ramps: tuple[Real, Real]) -> tuple[Real, Real]:
+    """``A Phi + b_in R_in + b_out R_out`` and its slope in t; ``ramps`` are ``b_in`` and ``b_out``."""
+    shape, inside, outside, density = profile(offset, place, blur)
+    value = step * shape + ramps[0] * inside + ramps[1] * outside
+    return value, step * density + ramps[0] + (ramps[1] - ramps[0]) * shape
 
 
 def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) -> tuple[Profiles, Profiles | None]:
@@ -214,10 +175,8 @@ def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) ->
 def _misfit(offset: Float32, value: Float32, profiles: Array) -> Float32:
     """Absolute residuals of pixels ``(k, m)`` for profiles ``(k, 6)``: place, blur, level, step and ramps."""
     place, blur, level, step, inside, outside = (a[:, None].astype(np.float32) for a in profiles.T)
-    residual, _ = _shaded(offset, place, blur, step, (inside, outside))
-    residual += level
-    residual -= value
-    return np.abs(residual, out=residual)
+    shape, _ = _shaded(offset, place, blur, step, (inside, outside))
+    return np.asarray(np.abs(shape + level - value), np.float32)
 
 
 def _scatter(residual: Float32) -> Array:

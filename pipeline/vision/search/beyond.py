@@ -46,7 +46,6 @@ _BEYOND_CONTRAST = (0.6, 1.6)
 """Of the strip's step by its ground's brightness; a shadow leaves it as it is, but stray light and the camera's curve
 do not; covers and clamps differ by more.
 """
-_HIDDEN_WIDTHS = 15.0  # widths; what hides an end before an axis that was given is no longer: a clamp of 30 mm on 2 mm
 _CLAMP_TAIL_SHARE = 0.1  # of the strip's length; a cable's tail beyond a clamp is shorter, its rest longer
 _WHOLE_SHARE = 0.97  # of the known length; a strip so long with free ends is the whole cable
 
@@ -243,21 +242,3 @@ def rest_faced_at(
         gap = rest_ahead(standout, cut, rest, at_start=at_start) if axis.kind in ("end", "clamp") else None
         gaps += [] if gap is None else [(gap, axis.center_px)]
     return min(gaps)[1] if gaps else None
-
-
-def short_of_axis(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None:
-    """The end of a strip that lies before an axis that the user gave: far from it, or while the cable goes on."""
-    width = cut.usual_width
-    path = standout.to_pixels(cut.path)
-    near, far = LEAST_MORE_WIDTHS * width * standout.reduction, _HIDDEN_WIDTHS * width * standout.reduction
-    for axis, at_start in zip(axes, (True, False), strict=True):
-        distance = np.hypot(*(path - axis.center_px).T)
-        end = 0 if at_start else len(path) - 1
-        # a strip that passes the axis is nearest to it before its end
-        ahead = abs(int(np.argmin(distance)) - end) * standout.reduction < 0.5 * distance[end]
-        if axis.kind != "given" or not ahead or distance[end] < near:
-            continue
-        outward = cut.path[::-1] if at_start else cut.path
-        if distance[end] > far or _ahead(standout, cut, outward, width) is not None:
-            return float(path[end, 0]), float(path[end, 1])
-    return None

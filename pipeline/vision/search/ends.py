@@ -28,7 +28,6 @@ from pipeline.vision.search.strips import end_direction
 COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges so far beyond its circle
 _TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
 _BORDER_CELLS, _BORDER_WIDTHS = 2.0, 0.25  # cells and widths; so near the border an end is no end of the cable
-_STROKE_WIDTHS = 0.25  # widths; a shorter change near the end is print: letters are 0.6 high, strokes a sixth of it
 _CENTRED_WIDTHS = 0.04  # widths; how far aside of the cable's middle the search ends its path
 _EDGE_STD_PX = 0.25  # px; what halo, JPEG and grid move an edge, on all rows alike
 
@@ -42,15 +41,10 @@ class CableEnd:
     at_object: bool = False
 
 
-def find_end(path: Array, reading: Reading, standout: Standout, cover_radius_px: float | None) -> CableEnd:
-    """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins.
-
-    A cover hardly wider than the cable stays part of the strip and bends its skeleton; there the piece that is led
-    straight begins a cover's radius earlier.
-    """
+def find_end(path: Array, reading: Reading, standout: Standout) -> CableEnd:
+    """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins."""
     width = reading.width
     trimmed = _TRIMMED_WIDTHS * width
-    trimmed = trimmed if cover_radius_px is None else max(trimmed, 1.2 * cover_radius_px / standout.reduction)
     body, outward = straight_body(path, width, trimmed)
     place, at_object = body[-1], False
     for step in np.arange(0.0, trimmed + 2.0 * width, 0.5):
@@ -131,7 +125,7 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tu
     rows = np.linspace(-0.25, 0.25, 9) * width
     points = path[-1] - closeup.origin_px + along[None, :, None] * outward + rows[:, None, None] * across
     profiles = sampled(closeup.grey, points)
-    places = [_half_level(profile, along, width, _STROKE_WIDTHS * width) for profile in profiles]
+    places = [_half_level(profile, along, width) for profile in profiles]
     known = np.array([(row, place) for row, place in zip(rows, places, strict=True) if place is not None])
     if len(known) < 5:
         return settled, path
@@ -164,16 +158,11 @@ def led_on(body: Array, outward: Array, reach: float, width: float, *, base: flo
     return np.vstack([body, body[-1] + steps[:, None] * outward + turned[:, None] * across])
 
 
-def _half_level(profile: Array, along: Array, width: float, stroke: float) -> float | None:
-    """Where the grey leaves the cable's for the ground's for longer than ``stroke``; None without a clear step."""
+def _half_level(profile: Array, along: Array, width: float) -> float | None:
+    """Where the grey leaves the cable's for the ground's; None without a clear step."""
     cable, ground = median(profile[along < -0.6 * width]), median(profile[along > 0.6 * width])
     relief = (profile - ground) / (cable - ground) if abs(cable - ground) > 1e-6 else np.zeros_like(profile)
-    low = relief < 0.5
-    # a stroke of print is no end: the sheath goes on beyond it
-    for start, stop in runs_of(low):
-        if stop < len(low) and along[stop - 1] - along[start] < stroke:
-            low[start:stop] = False
-    fallen = np.flatnonzero(low & (along > -0.6 * width))
+    fallen = np.flatnonzero((relief < 0.5) & (along > -0.6 * width))
     if not len(fallen) or relief[i := int(fallen[0]) - 1] < 0.5:
         return None
     share = (relief[i] - 0.5) / (relief[i] - relief[i + 1])
