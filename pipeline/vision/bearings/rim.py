@@ -34,6 +34,7 @@ _LIGHT_REACH_PX = 4.0  # px; half range about an edge in which the light's slope
 _BEVEL_SPREAD_SHARE = 0.22
 """Of the rim's blur; standard deviation of what a bevel moves the rim all round: half at most on 18 rendered covers."""
 _RIM_TOLERANCE = 0.015  # radii; an edge so near to the circle belongs to the rim, chance edges spread ten times wider
+_NEAR_PX, _NEAR = 0.75, 0.1  # px; the same of small covers, and in radii at most: of chance edges more are near those
 _POOLED_RAYS = 1.5  # rays; standard deviation of the pooling along the rim
 _DIRECTIONS = 160  # rays of the circle fit at most; more share their pixels and tell little new
 
@@ -97,7 +98,7 @@ def fit_circle(
             return None
         before, (parameters, covariance) = parameters, fitted
     miss = np.hypot(*(before[:2] + (before[2] + edge)[:, None] * ray - parameters[:2]).T) - parameters[2]
-    rim = float(np.mean((np.abs(miss) < max(0.75, _RIM_TOLERANCE * radius)) & foremost))
+    rim = float(np.mean((np.abs(miss) < max(min(_NEAR_PX, _NEAR * radius), _RIM_TOLERANCE * radius)) & foremost))
     off, other = np.hypot(*(parameters[:2] - center)), abs(parameters[2] - radius)
     concentric = other > max(4.0 * expected.std * radius, 1.0)
     if off > 0.5 * radius or (concentric and (rim < SURE_RIM or other > 1.2 * span)):
