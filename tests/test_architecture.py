@@ -66,7 +66,8 @@ INSIDE = {
         ("identified_again", "heldout", "force_breaks", "outlier", "ordinary"),
     ],
     "pipeline.diagnosis.posterior": [
-        ("explanation", "error_grid", "words"),
+        ("explanation", "products", "words"),
+        ("error_grid",),
         ("unknowns",),
         ("evidence", "hypotheses"),
         ("weigh", "detectable", "mixture"),
