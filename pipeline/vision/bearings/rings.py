@@ -4,7 +4,8 @@
 
 A shadow, an arm or the cable beside the rim leads a fit of the rim astray; what lies on the cover they do not touch.
 About the true centre the mean grey value on circles falls and rises in sharp steps; about any other place the steps
-are smeared. The sum of the squared slopes of that mean is the measure of roundness.
+are smeared. The sum of the squared slopes of that mean is the measure of roundness. What is not round, the quadrants of
+a target or a slotted screw, tells the axis by looking the same turned by half a turn.
 Units: px of the photo as displayed.
 """
 
