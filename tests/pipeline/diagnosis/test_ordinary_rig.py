@@ -15,8 +15,8 @@ from pipeline.diagnosis.diagnose import diagnose
 from pipeline.diagnosis.explanations.search import searched
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.posterior.detectable import found_at
-from pipeline.diagnosis.posterior.error_grid import AS_RIGS_ARE, MOVED
 from pipeline.diagnosis.posterior.hypotheses import SHARES
+from pipeline.diagnosis.posterior.products import AS_RIGS_ARE, MOVED
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 

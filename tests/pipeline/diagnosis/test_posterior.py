@@ -14,9 +14,10 @@ from fixtures.hidden import LOOP, Reading, hidden_test
 from fixtures.scores import SETTINGS, error_models, exact_bench
 from fixtures.trials import random_cable
 from pipeline.diagnosis import diagnose
-from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, MOVED, SHAPES, SLOW, hold_sizes
+from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, SHAPES, SLOW, hold_sizes
 from pipeline.diagnosis.posterior.evidence import SIZES, as_told, evidence, evidences, moments
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
+from pipeline.diagnosis.posterior.products import MOVED
 from pipeline.diagnosis.posterior.weigh import weighed_draws
 from pipeline.diagnosis.posterior.words import verdict
 from pipeline.faults import faults_of_input
