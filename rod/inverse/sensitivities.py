@@ -10,18 +10,17 @@ Sign: residual = data - model, so the Jacobian here is that of the model, ``d re
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rod.inverse.bending import bending_numbers, combined, plainly
-from rod.inverse.extension import STEP, Extension, Term
+from rod.inverse.extension import Extension
 from rod.inverse.linearised import columns_of
 from rod.inverse.observation import Observation, residual
-from rod.inverse.prediction import Model, Prediction, end_for_end
-from rod.inverse.simulation import Run, base_derivatives, moved, observed, run
+from rod.inverse.prediction import Model, Prediction
+from rod.inverse.simulation import Run, moved, observed, run
 
 Array = NDArray[np.float64]
 
@@ -99,33 +98,3 @@ def _quotient(
         if value is not None:
             return np.asarray((at_here - value) / signed)
     return np.zeros_like(at_here)
-
-
-def profile_columns(
-    observation: Observation, extension: Extension, vector: Array, here: Run, terms: Sequence[Term]
-) -> Array:
-    """Columns (N, terms) of the amounts of profiles along the cable, whether or not they are in the model.
-
-    Rows of prior knowledge are zero: what is known of a term beforehand has a row where it is in the model.
-
-    Parameters
-    ----------
-    observation : Observation
-    extension : Extension
-    vector : (p,)
-    here : Run
-        Of the model at the vector, with a prediction.
-    terms : sequence of Term
-        Of causes of `causes.profile`.
-    """
-    if not terms:
-        return np.zeros((len(extension.prior) + observation.rows.count, 0))
-    facts = extension.facts
-    cable = end_for_end(here.model) if extension.turned else here.model
-    given = [term.cause.along_cable(term.variant, cable) for term in terms]
-    by = base_derivatives(here, facts, [(name, phi[::-1] if extension.turned else phi) for name, phi in given])
-    assert here.prediction is not None and here.bare is not None
-    steps = np.array([STEP * term.cause.plausible(facts) for term in terms])
-    shown = observed(moved(here.bare, by, range(len(steps)), steps), here.model, facts)
-    columns = columns_of(observation, here.prediction, shown, steps)
-    return np.vstack([columns, np.zeros((len(extension.prior), len(terms)))])
