@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import deviation, position_of, profile, wave
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import FITS, Fit, fit_from
+from rod.inverse.fit import Fit, fit_from
 from rod.inverse.observation import Observation
 
 Array = NDArray[np.float64]
@@ -25,13 +25,8 @@ WAVES = 24
 a photo shows. A shape has 20 functions a photo, so more could hardly be told apart."""
 
 
-def leaves_more(fitted: Fit) -> bool:
-    """Whether a model leaves more than the noise: a further form of a profile may tell of it."""
-    return fitted.chi2 > FITS * (len(fitted.residual) - fitted.extension.size)
-
-
-def free_profile(observation: Observation, fitted: Fit, cause: Cause) -> Fit | None:
-    """Fit waves in the place of the forms of a cause along the cable; None where that has no equilibrium.
+def free_profile(observation: Observation, fitted: Fit, cause: Cause) -> list[Fit]:
+    """Fit waves in the place of the forms of a cause along the cable; empty where that has no equilibrium.
 
     Parameters
     ----------
@@ -42,7 +37,7 @@ def free_profile(observation: Observation, fitted: Fit, cause: Cause) -> Fit | N
         A profile along the cable.
     """
     found = fit_from(observation, *in_waves(fitted, cause), fitted)
-    return None if found.run.prediction is None else found
+    return [] if found.run.prediction is None else [found]
 
 
 def in_waves(fitted: Fit, cause: Cause) -> tuple[Extension, Array]:

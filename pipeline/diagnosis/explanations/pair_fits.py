@@ -14,13 +14,13 @@ import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
 from pipeline.diagnosis.explanations.forms import with_more_forms
-from pipeline.diagnosis.explanations.free_profile import free_profile, leaves_more
+from pipeline.diagnosis.explanations.free_profile import free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import fit_from
+from rod.inverse.fit import FITS, fit_from
 
 
 def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int]) -> list[Explanation]:
@@ -80,8 +80,8 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
     for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
         hopeless, fitted = min(e.fitted.chi2 for e in (*found, *new)) + LEAST, [pair.fitted]
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
-            if kind.varies and leaves_more(fitted[-1]):
-                fitted += [free for free in [free_profile(bench.observation, fitted[-1], kind)] if free is not None]
+            if kind.varies:
+                fitted += free_profile(bench.observation, fitted[-1], kind) if fitted[-1].reduced_chi2 > FITS else []
             elif kind.combines:
                 for setting in {term.variant.setting for term in fitted[-1].extension.terms if term.cause is kind}:
                     fitted.append(with_more_forms(bench.observation, fitted[-1], kind, setting, hopeless=hopeless))

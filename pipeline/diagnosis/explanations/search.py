@@ -234,7 +234,7 @@ def searched(bench: Workbench) -> Search:
     silent = silent and first.word == "base"
     hidden = hidden_pair(bench.suspicion) if silent else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise
-    fits = bench.base.chi2 < FITS * (len(bench.base.residual) - bench.base.extension.size)
+    fits = bench.base.reduced_chi2 < FITS
     if silent and fits and not hidden:
         return search
     search.singles()

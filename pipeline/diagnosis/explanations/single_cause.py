@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
 from pipeline.diagnosis.explanations.forms import as_one_form, with_more_forms
-from pipeline.diagnosis.explanations.free_profile import free_profile, leaves_more
+from pipeline.diagnosis.explanations.free_profile import free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
@@ -35,7 +35,7 @@ def refits(
     first fit is not tried from other starts and with further forms.
     """
     kind, found = suspicion.causes[cause], list[Fit]()
-    first = _strong_profile(observation, base, suspicion, cause) if kind.varies and leaves_more(base) else None
+    first = _strong_profile(observation, base, suspicion, cause) if kind.varies else None
     if first is None:
         best = _by_setting(observation, base, suspicion, cause, hopeless=rival + LEAST)
         if kind.combines:
@@ -44,9 +44,8 @@ def refits(
         found = [min(best.values(), key=cost)] if best else []
     else:
         found = [with_more_forms(observation, first, kind, "", hopeless=rival + LEAST)]
-    if kind.varies and found and leaves_more(found[0]):
-        found += [free for free in [free_profile(observation, found[0], kind)] if free is not None]
     if kind.varies and found:
+        found += free_profile(observation, found[0], kind) if found[0].reduced_chi2 > FITS else []
         found += as_one_form(observation, found[-1])
     return [explanation_of((cause,), base, one) for one in found]
 
@@ -62,8 +61,10 @@ def refit_one(
 def _strong_profile(observation: Observation, base: Fit, suspicion: Suspicion, cause: int) -> Fit | None:
     """A profile along the cable in its best form where that leaves more than noise: other forms alone will not do."""
     direction = suspicion.best(cause)
-    first = None if direction is None else fit_term(observation, base, suspicion, direction)
-    return first if first is not None and leaves_more(first) else None
+    if direction is None or base.reduced_chi2 < FITS:
+        return None
+    first = fit_term(observation, base, suspicion, direction)
+    return None if first is None or first.reduced_chi2 < FITS else first
 
 
 def _by_setting(
@@ -75,7 +76,6 @@ def _by_setting(
     hopeless: float,
 ) -> dict[str, Fit]:
     """The best fit of a single form of a cause for each setting; empty where no form can be simulated."""
-    to_the_noise = FITS * (len(base.residual) - base.extension.size)
     best: dict[str, Fit] = {}
     enough: dict[str, int] = {}
     for direction in _first_forms(suspicion, cause):
@@ -87,7 +87,7 @@ def _by_setting(
         found = _fit_form(observation, base, suspicion, direction, hopeless=hopeless)
         if found is None:
             continue
-        if found.converged and found.chi2 < to_the_noise:
+        if found.converged and found.reduced_chi2 < FITS:
             enough[term.variant.label] = term.size
         setting = term.variant.setting
         best[setting] = min(best.get(setting, found), found, key=cost)
