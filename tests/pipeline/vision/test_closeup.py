@@ -77,7 +77,7 @@ def test_letters_on_the_sheath_are_no_blur():
     assert_allclose(arc(letters=True).blur_px, arc().blur_px, rtol=0.1)
 
 
-@pytest.mark.parametrize("sensor", [Sensor(motion_px=30.0, motion_rad=0.6), Sensor(blur_px=8.0)], ids=["moved", "blur"])
+@pytest.mark.parametrize("sensor", [Sensor(motion_px=25.0, motion_rad=0.6), Sensor(blur_px=8.0)], ids=["moved", "blur"])
 def test_covers_lost_in_blur_are_no_reason_of_their_own(sensor):
     length, scale = 0.181, 8_000.0
     curve = Curve.from_curvature(lambda s: 3.0 + 5.0 * np.sin(np.pi * s / length), length)
