@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.inverse.cause import Profile
 from rod.inverse.extension import Extension
 from rod.inverse.prediction import Facts, Model, end_for_end
 from rod.inverse.simulation import Run, base_derivatives, freedom
@@ -61,7 +62,7 @@ def plainly(extension: Extension, vector: Array, base_model: Model) -> Model:
     """The model at a vector (p,) without profiles along the cable, which no other cause touches."""
     model = base_model
     for k, at in enumerate(extension.amounts_at):
-        if not extension.terms[k].cause.varies:
+        if not isinstance(extension.terms[k].cause, Profile):
             term = extension.formed(vector, k)
             model = term.cause.apply(model, float(vector[at]), term.variant, extension.facts)
     return model
@@ -83,8 +84,8 @@ def bending_numbers(extension: Extension, vector: Array, base_model: Model, here
     for k, at in enumerate(extension.amounts_at):
         term = extension.formed(vector, k)
         numbers = range(at, at + term.size)
-        if term.cause.varies:
-            _of_profile(bends, extension, vector, k, here)
+        if isinstance(term.cause, Profile):
+            _of_profile(bends, extension, vector, k, term.cause, here)
             continue
         alone = term.cause.apply(base_model, float(vector[at]), term.variant, extension.facts)
         if alone.bending is base_model.bending and alone.shift is base_model.shift:
@@ -124,16 +125,16 @@ def _of_base(bends: Bends, extension: Extension, vector: Array, here: Model) -> 
     bends.by("length", last, -bending.length / (1.0 + float(vector[last])))
 
 
-def _of_profile(bends: Bends, extension: Extension, vector: Array, k: int, here: Model) -> None:
+def _of_profile(bends: Bends, extension: Extension, vector: Array, k: int, cause: Profile, here: Model) -> None:
     """Amount, place and width of a form along the cable."""
     term, at = extension.formed(vector, k), extension.amounts_at[k]
     cable = end_for_end(here) if extension.turned else here
-    name, phi = term.cause.along_cable(term.variant, cable)
+    name, phi = cause.along_cable(term.variant, cable)
     moves = [phi]
     for tuned in term.variant.tuned:
         step = 1e-3 * SHORT * term.variant.scale(tuned)
         beside = term.variant.moved({tuned: getattr(term.variant, tuned) + step})
-        moves.append(float(vector[at]) * (term.cause.along_cable(beside, cable)[1] - phi) / step)
+        moves.append(float(vector[at]) * (cause.along_cable(beside, cable)[1] - phi) / step)
     for i, move in enumerate(moves):
         bends.by((name, move[::-1] if extension.turned else move), at + i)
 

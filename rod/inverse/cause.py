@@ -115,8 +115,6 @@ class Cause(ABC):
     limited : bool
         Whether many times the plausible amount cannot be. A number typed wrongly, a zero never set, a bearing that has
         seized, a heavy or patched cable may be off by any amount.
-    varies : bool
-        Whether its forms are profiles along the cable, see `along_cable`.
     """
 
     name: ClassVar[str]
@@ -126,7 +124,6 @@ class Cause(ABC):
     combines: ClassVar[bool] = False
     additive: ClassVar[bool] = False
     limited: ClassVar[bool] = False
-    varies: ClassVar[bool] = False
 
     @abstractmethod
     def plausible(self, facts: Facts) -> float:
@@ -154,9 +151,13 @@ class Cause(ABC):
         """
         return None
 
-    def along_cable(self, variant: Variant, model: Model) -> tuple[str, Array]:
-        """Parameter of `rod.parameters` that the amount of a form moves, and the basis (n joints,) along which.
 
-        Raises `NotImplementedError` if the cause does not vary along the cable.
-        """
-        raise NotImplementedError(self.name)
+@dataclass(frozen=True)
+class Profile(Cause):
+    """A cause whose forms are profiles along the cable, which add up."""
+
+    combines: ClassVar[bool] = True
+
+    @abstractmethod
+    def along_cable(self, variant: Variant, model: Model) -> tuple[str, Array]:
+        """Parameter of `rod.parameters` that the amount of a form moves, and the basis (n joints,) along which."""

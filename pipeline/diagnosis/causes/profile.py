@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.inverse.cause import Cause, Variant
+from rod.inverse.cause import Cause, Profile, Variant
 from rod.inverse.prediction import Facts, Model
 
 Array = NDArray[np.float64]
@@ -188,15 +188,13 @@ def position_of(model: Model) -> Array:
     return np.concatenate(([0.0], np.cumsum(model.bending.rod.elements)))
 
 
-class PreCurvatureVarying(Cause):
+class PreCurvatureVarying(Profile):
     """``pre_curvature_varying``: the cable is bent at rest, but not uniformly."""
 
     name = "pre_curvature_varying"
     unit = "1/m"
-    combines = True
     limited = True
     seat = "cable"
-    varies = True
 
     def plausible(self, facts: Facts) -> float:
         """A change of direction of a tenth of a radian over the cable."""
@@ -216,14 +214,12 @@ class PreCurvatureVarying(Cause):
         return "pre_curvature", profile(variant, position_of(model))
 
 
-class StiffnessVarying(Cause):
+class StiffnessVarying(Profile):
     """``stiffness_varying``: the cable is not equally stiff everywhere."""
 
     name = "stiffness_varying"
     unit = "-"
-    combines = True
     seat = "cable"
-    varies = True
 
     def plausible(self, facts: Facts) -> float:
         """A tenth."""

@@ -19,6 +19,7 @@ from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
+from rod.inverse.cause import Profile
 from rod.inverse.extension import Extension, Term
 from rod.inverse.fit import FITS, fit_from
 
@@ -80,7 +81,7 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
     for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
         hopeless, fitted = min(e.fitted.chi2 for e in (*found, *new)) + LEAST, [pair.fitted]
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
-            if kind.varies:
+            if isinstance(kind, Profile):
                 fitted += free_profile(bench.observation, fitted[-1], kind) if fitted[-1].reduced_chi2 > FITS else []
             elif kind.combines:
                 for setting in {term.variant.setting for term in fitted[-1].extension.terms if term.cause is kind}:

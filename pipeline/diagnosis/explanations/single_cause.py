@@ -16,6 +16,7 @@ from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
+from rod.inverse.cause import Profile
 from rod.inverse.fit import FITS, Fit, fit_from
 from rod.inverse.observation import Observation
 
@@ -35,7 +36,7 @@ def refits(
     first fit is not tried from other starts and with further forms.
     """
     kind, found = suspicion.causes[cause], list[Fit]()
-    first = _strong_profile(observation, base, suspicion, cause) if kind.varies else None
+    first = _strong_profile(observation, base, suspicion, cause) if isinstance(kind, Profile) else None
     if first is None:
         best = _by_setting(observation, base, suspicion, cause, hopeless=rival + LEAST)
         if kind.combines:
@@ -44,7 +45,7 @@ def refits(
         found = [min(best.values(), key=cost)] if best else []
     else:
         found = [with_more_forms(observation, first, kind, "", hopeless=rival + LEAST)]
-    if kind.varies and found:
+    if isinstance(kind, Profile) and found:
         found += free_profile(observation, found[0], kind) if found[0].reduced_chi2 > FITS else []
         found += as_one_form(observation, found[-1])
     return [explanation_of((cause,), base, one) for one in found]

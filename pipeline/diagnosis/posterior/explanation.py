@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.profile import largest, largest_of
-from rod.inverse.cause import Variant
+from rod.inverse.cause import Profile, Variant
 from rod.inverse.fit import Fit
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Explanation:
         That of a profile along the cable is its largest deviation beyond doubt, of all forms together.
         """
         forms, amounts, covariance = self._forms(cause)
-        if cause.varies and len(forms) > 1:
+        if isinstance(cause, Profile) and len(forms) > 1:
             return _total(largest_of(forms, amounts, covariance, cause), amounts, covariance)
         if cause.additive:
             return _total(np.ones(len(forms)), amounts, covariance)
