@@ -149,11 +149,10 @@ def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected) -> b
     """Whether the cable is seen better in one colour: what is narrower or shorter may be a stripe or a half of it."""
     if isinstance(in_one, Rejected) or _is_piece(in_one):  # a piece of the cable may be anything of that colour too
         return False
-    if isinstance(found, Rejected) or in_one.length_px > _WIDER * found.length_px:
+    if isinstance(found, Rejected):
         return True
-    if in_one.half_width_px > _WIDER * found.half_width_px:
-        return True
-    return in_one.evidence.firmness > found.evidence.firmness
+    larger = max(in_one.length_px / found.length_px, in_one.half_width_px / found.half_width_px)
+    return larger > _WIDER or in_one.evidence.firmness > found.evidence.firmness
 
 
 def _is_piece(found: RoughCable) -> bool:
