@@ -34,7 +34,7 @@ _LIGHT_REACH_PX = 4.0  # px; half range about an edge in which the light's slope
 _BEVEL_SPREAD_SHARE = 0.22
 """Of the rim's blur; standard deviation of what a bevel moves the rim all round: half at most on 18 rendered covers."""
 _RIM_TOLERANCE = 0.015  # radii; an edge so near to the circle belongs to the rim, chance edges spread ten times wider
-_NEAR_PX, _NEAR = 0.75, 0.1  # px; the same of small covers, and in radii at most: of chance edges more are near those
+_LEAST_TOLERANCE_PX, _MOST_TOLERANCE = 0.75, 0.1  # px, as pixels allow; radii of a small cover, near which chance lies
 _POOLED_RAYS = 1.5  # rays; standard deviation of the pooling along the rim
 _DIRECTIONS = 160  # rays of the circle fit at most; more share their pixels and tell little new
 
@@ -98,7 +98,8 @@ def fit_circle(
             return None
         before, (parameters, covariance) = parameters, fitted
     miss = np.hypot(*(before[:2] + (before[2] + edge)[:, None] * ray - parameters[:2]).T) - parameters[2]
-    rim = float(np.mean((np.abs(miss) < max(min(_NEAR_PX, _NEAR * radius), _RIM_TOLERANCE * radius)) & foremost))
+    tolerance = max(min(_LEAST_TOLERANCE_PX, _MOST_TOLERANCE * radius), _RIM_TOLERANCE * radius)
+    rim = float(np.mean((np.abs(miss) < tolerance) & foremost))
     off, other = np.hypot(*(parameters[:2] - center)), abs(parameters[2] - radius)
     concentric = other > max(4.0 * expected.std * radius, 1.0)
     if off > 0.5 * radius or (concentric and (rim < SURE_RIM or other > 1.2 * span)):
@@ -210,8 +211,8 @@ def _best_shift(photo: Photo, parameters: Array, ray: Array, span: float, softne
 def _radial_edges(slopes: _Slopes, span: float, softness: float) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Radius of the edge in each direction relative to the circle, NaN where none stands out, and its weight.
 
-    Of several edges it is one near the circle, since a cover may have steeper ones; third: whether none there is, for
-    of chance edges some are near any circle.
+    Of several edges on a ray the one near the circle is taken, since what lies on a cover may be steeper than its rim.
+    Third: whether it is the steepest on its ray; only then it proves a rim, for some chance edge is near any circle.
 
     The variance of an edge falls with the square of its slope; a soft shadow beside a rim of little contrast would
     else pass for the rim.
