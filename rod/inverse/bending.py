@@ -133,7 +133,7 @@ def _of_profile(bends: Bends, extension: Extension, vector: Array, k: int, cause
     moves = [phi]
     for tuned in term.variant.tuned:
         step = 1e-3 * SHORT * term.variant.scale(tuned)
-        beside = term.variant.moved({tuned: getattr(term.variant, tuned) + step})
+        beside = term.variant.moved({tuned: term.variant.number(tuned) + step})
         moves.append(float(vector[at]) * (cause.along_cable(beside, cable)[1] - phi) / step)
     for i, move in enumerate(moves):
         bends.by((name, move[::-1] if extension.turned else move), at + i)

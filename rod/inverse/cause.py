@@ -33,6 +33,8 @@ class Variant:
         Which of ``at`` and ``width`` a refit may change.
     at_range, width_range : (low, high)
         Where they may go.
+    by_factors : bool
+        Whether ``at``, a time, is known by its order of magnitude: what a refit changes is its logarithm.
     setting : str
         What all forms of the cause that act together have in common, such as where the displacement is counted from.
     trace : float
@@ -58,6 +60,7 @@ class Variant:
     tuned: tuple[str, ...] = ()
     at_range: tuple[float, float] = (0.0, 1.0)
     width_range: tuple[float, float] = (0.0, 1.0)
+    by_factors: bool = False
     setting: str = ""
     trace: float = 1.0
     power: float = 1.0
@@ -76,18 +79,27 @@ class Variant:
         """The same form wherever its trace is computed."""
         return replace(self, trace=1.0)
 
-    def range(self, name: str) -> tuple[float, float]:
-        """Range of ``at`` or ``width``."""
-        return self.at_range if name == "at" else self.width_range
+    def number(self, name: str) -> float:
+        """What a refit changes of ``at`` or ``width``: itself, or its logarithm."""
+        return self._number(name, self.at if name == "at" else self.width)
 
-    def moved(self, places: dict[str, float]) -> Variant:
-        """The same form elsewhere: ``at`` and ``width`` where they are given."""
-        return replace(self, at=places.get("at", self.at), width=places.get("width", self.width))
+    def range(self, name: str) -> tuple[float, float]:
+        """Range of that number."""
+        low, high = self.at_range if name == "at" else self.width_range
+        return self._number(name, low), self._number(name, high)
+
+    def moved(self, numbers: dict[str, float]) -> Variant:
+        """The same form elsewhere: ``at`` and ``width`` by the numbers that are given."""
+        at = float(np.exp(numbers["at"])) if self.by_factors and "at" in numbers else numbers.get("at", self.at)
+        return replace(self, at=at, width=numbers.get("width", self.width))
 
     def scale(self, name: str) -> float:
-        """Size of a large change of ``at`` or ``width``."""
+        """Size of a large change of that number."""
         low, high = self.range(name)
         return high - low
+
+    def _number(self, name: str, value: float) -> float:
+        return float(np.log(value)) if self.by_factors and name == "at" else value
 
 
 PLAIN = (Variant(),)

@@ -43,7 +43,7 @@ class Term(NamedTuple):
 
     def numbers(self, amount: float) -> Array:
         """Its numbers (size,) in the vector at an amount, the form as it is."""
-        return np.array([amount, *(getattr(self.variant, name) for name in self.variant.tuned)])
+        return np.array([amount, *(self.variant.number(name) for name in self.variant.tuned)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +69,19 @@ class Extension:
     def terms_of(self, cause: Cause) -> list[int]:
         """Which terms are forms of a cause."""
         return [k for k, term in enumerate(self.terms) if term.cause is cause]
+
+    @cached_property
+    def places(self) -> tuple[tuple[int, float, float], ...]:
+        """Position in the vector of every number of a form that is tuned; middle and standard deviation of its range.
+
+        Anywhere in its range is as likely.
+        """
+        found = []
+        for at, term in zip(self.amounts_at, self.terms, strict=True):
+            for j, name in enumerate(term.variant.tuned, start=at + 1):
+                low, high = term.variant.range(name)
+                found.append((j, 0.5 * (low + high), (high - low) / np.sqrt(12.0)))
+        return tuple(found)
 
     @cached_property
     def prior(self) -> Array:

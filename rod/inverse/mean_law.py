@@ -135,15 +135,14 @@ def linearised(observation: Observation, fitted: Fit, beside: Array) -> tuple[Ar
     value = np.r_[weight * fitted.residual[:count], fitted.residual[count:known]]
     columns = np.hstack([fitted.jacobian, beside])
     J = -np.vstack([weight[:, None] * columns[:count], columns[count:known]])
-    sizes, seen_from = [], []  # of an amount its zero, of a place or a time where it was found
-    for term, at in zip(fitted.extension.terms, fitted.extension.amounts_at, strict=True):
-        tuned = [term.variant.scale(name) for name in term.variant.tuned]
-        sizes += [min(FORGOTTEN, term.variant.known) * term.cause.plausible(facts), *tuned]
-        seen_from += [fitted.vector[at], *np.zeros(len(tuned))]
-    sizes += [1.0] * beside.shape[1]
-    seen_from += [0.0] * beside.shape[1]
-    weak = np.hstack([np.zeros((len(sizes), len(base.names))), np.diag(1.0 / np.array(sizes))])
-    return np.r_[value, np.array(seen_from) / np.array(sizes)], np.vstack([J, weak])
+    extension, further = fitted.extension, beside.shape[1]
+    vector, middle, std = np.r_[fitted.vector, np.zeros(further)], np.zeros(J.shape[1]), np.ones(J.shape[1])
+    for term, at in zip(extension.terms, extension.amounts_at, strict=True):
+        std[at] = min(FORGOTTEN, term.variant.known) * term.cause.plausible(facts)
+    for at, *of_range in extension.places:
+        middle[at], std[at] = of_range
+    own = slice(len(base.names), None)
+    return np.r_[value, ((vector - middle) / std)[own]], np.vstack([J, np.diag(1.0 / std)[own]])
 
 
 def weights(observation: Observation, fitted: Fit) -> Array:

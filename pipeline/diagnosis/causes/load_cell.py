@@ -4,7 +4,7 @@
     force_gain    shown = F (1 + a)
     force_drift   shown = F + a T g(t / T)                   t: since the first hold began, T: until the last one did
     relaxation    shown = F (1 - a (1 - exp(-t / tau)))      t: since this hold began; sums of such forms, or
-                  shown = F (1 - a log(1 + t / tau) / log(1 + T / tau))    T: the longest hold
+                  shown = F (1 + t / tau)^-n                 a = 1 - (1 + T / tau)^-n, T: the longest hold
 
 What drifts does so steadily, g(u) = u, or settles like a warm-up or speeds up, g(u) = (1 - exp(-w u)) / (1 - exp(-w)).
 A zero that wanders has another rate in each hold, and between them.
@@ -176,22 +176,40 @@ def _moments(facts: Facts) -> Array:
     return np.asarray(np.maximum.accumulate(np.column_stack([facts.clock, ends]).ravel()))
 
 
-SLOWLY = "by as much in every tenfold of the time"
-"""Label and setting of a relaxation that has no time constant."""
+SLOWLY = "by a power of the time", "by a power of the time, since every change of the bow"
+"""Labels and settings of a relaxation that has no time constant, without and with a memory."""
 
 
 def lost_unseen(fitted_amount: float, variant: Variant, facts: Facts) -> float:
-    """Share of a force that relaxation takes in one interval of the log: a hold may have begun that much earlier."""
-    intervals = np.concatenate([np.diff(times) for times in facts.hold_times])
-    return fitted_amount * float(_lost(variant, facts, np.median(intervals)))
+    """Share of a force that may be lost before the first sample: a hold began at most one interval of the log earlier.
+
+    A power of the time that began a time b before the first sample, and is counted from there, has tau + b for its tau:
+    any b below that leaves the same samples. What is lost in b is then a share n log(1 - b / tau); root mean square
+    over b from 0 to the interval, or tau.
+    """
+    interval = float(np.median(np.concatenate([np.diff(times) for times in facts.hold_times])))
+    if variant.label not in SLOWLY:
+        return fitted_amount * float(_lost(variant, facts, np.array(interval)))
+    left = 1.0 - min(interval / variant.at, 1.0 - 1e-9)
+    square = (2.0 - left * (np.log(left) ** 2 - 2.0 * np.log(left) + 2.0)) / (1.0 - left)
+    return -float(np.log1p(-fitted_amount) / _decades(variant, facts) * np.sqrt(square))
 
 
 def _lost(variant: Variant, facts: Facts, since: Array) -> Array:
-    """Share of a moment that is lost a time after it came, per unit of amount."""
-    if variant.label == SLOWLY:
-        longest = max(float(np.ptp(times)) for times in facts.hold_times)
-        return np.asarray(np.log1p(since / variant.at) / np.log1p(longest / variant.at))
+    """Share of a moment that is lost a time after it came, per unit of amount; of a power of the time see `_taken`."""
+    if variant.label in SLOWLY:
+        return np.asarray(np.log1p(since / variant.at) / _decades(variant, facts))
     return np.asarray(-np.expm1(-since / variant.at))
+
+
+def _decades(variant: Variant, facts: Facts) -> float:
+    """Logarithm of the factor by which the longest hold is longer than ``at``."""
+    return float(np.log1p(max(float(np.ptp(times)) for times in facts.hold_times) / variant.at))
+
+
+def _taken(variant: Variant, amount: float, lost: Array) -> Array:
+    """Share of a moment that is lost: ``amount`` times `_lost`, or by a power of the time, (1 - amount)^lost left."""
+    return np.asarray(1.0 - max(1.0 - amount, 1e-9) ** lost if variant.label in SLOWLY else amount * lost)
 
 
 @lru_cache(maxsize=64)
@@ -238,23 +256,25 @@ class Relaxation(Cause):
             Variant("decaying since every change of the bow", width=1.0, setting="memory"),
         )
         decays = tuple(
-            replace(form, at=share * span, tuned=("at",), at_range=reach)
+            replace(form, at=share * span, tuned=("at",), at_range=reach, by_factors=True)
             for form in forms
             for share in (0.1, 0.3, 1.0, 3.0)
         )
-        slowly = Variant(SLOWLY, at=0.03 * span, width=1.0, tuned=("at",), at_range=(1e-3 * span, span), setting=SLOWLY)
-        return (*decays, slowly)
+        slowly = tuple(
+            Variant(kind, 0.03 * span, memory, ("at",), (1e-3 * span, span), by_factors=True, setting=kind)
+            for kind, memory in zip(SLOWLY, (0.0, 1.0), strict=True)
+        )
+        return (*decays, *slowly)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Multiply readings by ``1 - amount (1 - exp(-t / at))``, ``at`` the relaxation time, t since the hold began.
 
-        Plastics relax by nearly as much in every tenfold of the time (Findley, Lai and Onaran 1976): ``at`` is then the
-        time from which on they do.
+        Plastics relax by a power of the time (Findley, Lai and Onaran 1976), from about ``at`` on.
 
         With a memory (``width`` 1) it is the changes of the moment, force times bow, from hold to hold that decay so,
         each since its own hold began: a standard linear solid, by Boltzmann's superposition.
         """
-        lost = _lost_by_hold(variant, facts)
+        lost = [_taken(variant, amount, share) for share in _lost_by_hold(variant, facts)]
 
         def observer(prediction: Prediction, facts: Facts) -> Prediction:
             at_once = prediction.force if prediction.at_once is None else prediction.at_once
@@ -263,8 +283,8 @@ class Relaxation(Cause):
 
             def taken(k: int) -> Array:
                 if not variant.width:
-                    return np.asarray(amount * at_once[..., k, None] * lost[k][0])
-                return np.asarray(amount * change[..., : k + 1] @ lost[k] / bow[..., k, None])
+                    return np.asarray(at_once[..., k, None] * lost[k][0])
+                return np.asarray(change[..., : k + 1] @ lost[k] / bow[..., k, None])
 
             gone = [taken(k) for k in range(len(lost))]
             samples = tuple(held - one[..., :-1] for held, one in zip(prediction.samples, gone, strict=True))

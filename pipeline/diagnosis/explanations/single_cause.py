@@ -42,7 +42,7 @@ def refits(
         if kind.combines:
             for setting, one in best.items():
                 best[setting] = with_more_forms(observation, one, kind, setting, hopeless=rival + LEAST)
-        found = [min(best.values(), key=cost)] if best else []
+        found = [one for one in best.values() if cost(one) < min(map(cost, best.values())) + LEAST]
     else:
         found = [with_more_forms(observation, first, kind, "", hopeless=rival + LEAST)]
     if isinstance(kind, Profile) and found:

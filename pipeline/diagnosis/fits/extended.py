@@ -115,6 +115,8 @@ def forms(fitted: Fit, cause: str, *, columns: int, covariance: Array | None = N
         first = used.index(at)
         rows[:, : root.shape[1]] = root[first : first + len(rows)]
         form = term.variant.moved({name: float(fitted.vector[at + 1 + j]) for j, name in enumerate(tuned)})
+        if form.by_factors:
+            rows[1:] *= form.at
         found.append(
             CauseForm(
                 label=form.label,

@@ -102,16 +102,16 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
     beyond, (residual, jacobian) = fitted.beyond_log, fitted.as_logged
     columns = np.hstack([residuals + (residual - fitted.residual)[:, None], jacobian])
     stated = np.delete(columns[data:], np.arange(base.known, len(base.prior)), axis=0)
-    places, mid, std = _places(fitted)
+    places = fitted.extension.places
     known = np.zeros((len(stated) + len(places) + 1, columns.shape[1]))
     known[: len(stated)] = stated
     falls, by = base.law.softening(fitted.vector[: base.law.size])
     known[-1, :several], known[-1, several : several + base.law.size] = -falls, by
-    for row, (at, middle, width) in enumerate(zip(places, mid, std, strict=True), start=len(stated)):
-        known[row, :several] = (middle - fitted.vector[at]) / width
-        known[row, several + at - len(beyond)] = 1.0 / width
+    for row, (at, middle, std) in enumerate(places, start=len(stated)):
+        known[row, :several] = (middle - fitted.vector[at]) / std
+        known[row, several + at - len(beyond)] = 1.0 / std
     found = grid.products(columns[:data], known, fitted.jacobian[:data, beyond], more[:data])
-    return found, sum(_log_known(fitted)) - float(np.sum(np.log(std)))
+    return found, sum(_log_known(fitted)) - sum(float(np.log(std)) for _, _, std in places)
 
 
 def _inverse_root(H: Array) -> tuple[Array, Array]:
@@ -183,18 +183,6 @@ def _unknown(fitted: Fit) -> list[int]:
     """Positions in the vector of amounts that no prior row states."""
     terms = zip(fitted.extension.amounts_at, fitted.extension.terms, strict=True)
     return [at for at, term in terms if not np.isfinite(term.variant.known)]
-
-
-def _places(fitted: Fit) -> tuple[list[int], list[float], list[float]]:
-    """Positions in the vector of places and widths that are tuned, the middle and the std of their range."""
-    at, mid, std = [], [], []
-    for first, term in zip(fitted.extension.amounts_at, fitted.extension.terms, strict=True):
-        for j, name in enumerate(term.variant.tuned, start=first + 1):
-            low, high = term.variant.range(name)
-            at.append(j)
-            mid.append(0.5 * (low + high))
-            std.append((high - low) / np.sqrt(12.0))
-    return at, mid, std
 
 
 def _log_known(fitted: Fit) -> list[float]:
