@@ -121,9 +121,10 @@ def _beside(bench: Workbench, conclusion: Conclusion) -> _Beside:
     if chance >= 0.5:
         findings.append(inferred("log/displacement-scatter", std_m=std))
     exact = None if chance >= 0.5 or conclusion.accepted is None else held_to(bench.observation, fitted, 0.0)
-    if own.rig < 0.5:
+    chance, off = own.rig
+    if chance < 0.5:
         return _Beside(exact, tuple(findings))
-    rig = ordinary.beside_ordinary_rig(bench.observation, exact or fitted, bench.suspicion)
+    rig = ordinary.beside_ordinary_rig(bench.observation, exact or fitted, bench.suspicion, off)
     return _Beside(rig or exact, (*findings, *(() if rig is None else ordinary.told(rig))))
 
 

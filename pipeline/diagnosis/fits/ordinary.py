@@ -1,4 +1,4 @@
-"""A rig that is off by what every rig is: zero of displacement, length and camera beside a fitted model.
+"""A rig that is off by what every rig is: zeros of displacement and force, length and camera beside a fitted model.
 
 So much is among the errors of the data (`pipeline.diagnosis.posterior.error_grid`) and is named by nobody. Where it is
 likelier than an exact rig, residuals and f_EI of a model with causes are those beside it, and the reader is
@@ -21,18 +21,25 @@ from rod.inverse.fit import Fit, fit_from
 from rod.inverse.observation import Observation
 
 
-def beside_ordinary_rig(observation: Observation, fitted: Fit, suspicion: Suspicion) -> Fit | None:
-    """Fit a model with the small errors that every rig has, each with its usual size; None without an equilibrium."""
-    extension = fitted.extension
-    present = {term.cause.name for term in extension.terms}
-    terms = tuple(
-        Term(term.cause, replace(form, known=form.ordinary / term.cause.plausible(extension.facts)))
+def beside_ordinary_rig(observation: Observation, fitted: Fit, suspicion: Suspicion, off: float = 1.0) -> Fit | None:
+    """Fit a model with the small errors that every rig has; None without an equilibrium.
+
+    ``off``: their size, in usual ones.
+    """
+    terms = ordinary_terms(suspicion, fitted, off)
+    wider = replace(fitted.extension, terms=(*fitted.extension.terms, *terms))
+    found = fit_from(observation, wider, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
+    return None if found.run.prediction is None else found
+
+
+def ordinary_terms(suspicion: Suspicion, fitted: Fit, off: float = 1.0) -> tuple[Term, ...]:
+    """What every rig has a little of, each of a size that is known, but what is in the model already."""
+    present = {term.cause.name for term in fitted.extension.terms}
+    return tuple(
+        Term(term.cause, replace(form, known=off * form.ordinary / term.cause.plausible(fitted.extension.facts)))
         for term in suspicion.terms
         if (form := term.variant).ordinary > 0.0 and term.cause.name not in present
     )
-    wider = replace(extension, terms=(*extension.terms, *terms))
-    found = fit_from(observation, wider, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
-    return None if found.run.prediction is None else found
 
 
 SEEN = 2.0

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,10 +112,16 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, o
     return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
 
 
-def ordinary(suspicion: Suspicion) -> Array:
-    """Whitened traces (N, r) of what every rig has a little of, each one standard deviation of it."""
-    size = np.array([term.variant.ordinary for term in suspicion.terms])
-    return np.asarray(suspicion.columns[:, size > 0.0] * size[size > 0.0])
+@lru_cache(maxsize=32)
+def ordinary(observation: Observation, terms: tuple[Term, ...], fitted: Fit) -> Array:
+    """Whitened traces (n, r) in the data of what every rig has a little of, each one standard deviation, beside a fit.
+
+    Of ``terms`` those that have an ordinary size, but what is in the model already.
+    """
+    present = {term.cause.name for term in fitted.extension.terms}
+    sizes = [(term, size) for term in terms if (size := term.variant.ordinary) > 0.0 and term.cause.name not in present]
+    found = [size * direction(observation, fitted, term, amount=size) for term, size in sizes]
+    return np.array(found).reshape(len(found), -1).T[: observation.rows.count]
 
 
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:

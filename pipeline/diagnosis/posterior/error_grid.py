@@ -7,7 +7,7 @@ A fit whitens its rows by the noise that is likeliest beforehand. What is known 
     hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean, and more of both
               as far as few samples leave the level of their noise open
     moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
-    rig       zero of displacement, length and lean of the camera as exact as told, or as rigs commonly have them;
+    rig       zeros of displacement and force, length and lean of the camera exact, as rigs have them, or worse;
               beside something else always as rigs have them, and that holds what displacements scatter
     shapes    something else in the shapes, a share of the length across the cable
     forces    something else in the forces, a share of the largest
@@ -43,6 +43,7 @@ from scipy.special import chdtri, ndtr
 
 from pipeline.diagnosis.posterior.products import Products, Spread, along, sums, with_rig
 from rod.inverse.common_errors import shared_light
+from rod.inverse.fit import Fit
 from rod.inverse.noise import by_axes, slow_errors
 from rod.inverse.observation import Observation, PhotoData
 from rod.inverse.prediction import Facts
@@ -107,8 +108,8 @@ class ErrorGrid:
     kinds : tuple of Kind
         Those of noise alone come first.
     hold : mapping of size -> probability
-    rig : (N, r)
-        Whitened sensitivities to what every rig has a little of, per standard deviation of it.
+    rig : Fit -> (N, r)
+        Whitened sensitivities of a fit to what every rig has a little of, per standard deviation of it; r may be 0.
     """
 
     photos: NDArray[np.int_]
@@ -117,19 +118,20 @@ class ErrorGrid:
     log_det: Array
     kinds: tuple[Kind, ...]
     hold: Mapping[float, float]
-    rig: Array
+    rig: Callable[[Fit], Array]
 
     @property
     def plain(self) -> ErrorGrid:
         """Without something else."""
         return replace(self, kinds=tuple(kind for kind in self.kinds if kind.noise))
 
-    def products(self, columns: Array, known: Array, displacements: Array, added: Array) -> Products:
+    def products(self, columns: Array, known: Array, displacements: Array, rig: Array, added: Array) -> Products:
         """Sums of own columns (N, o), with rows ``known`` (m, o) of prior knowledge, and of those added (N, k).
 
-        ``displacements`` (N, m): sensitivities to displacements that may scatter, per m; ``m`` may be 0.
+        ``displacements`` (N, m): sensitivities to displacements that may scatter, per m, and ``rig`` (N, r); both may
+        be none.
         """
-        beside = np.hstack([displacements, self.rig])
+        beside = np.hstack([displacements, rig])
         whole = np.hstack([columns, beside, added])
         extra, count = beside.shape[1], added.shape[1]
         own, force = columns.shape[1] + extra, whole[self.forces]
@@ -165,7 +167,7 @@ class ErrorGrid:
             scales=np.zeros((len(table), extra)),
             sizes=positions,
         )
-        return with_rig(found, displacements.shape[1], self.rig.shape[1])
+        return with_rig(found, displacements.shape[1], rig.shape[1])
 
     def something_else(self, position: NDArray[np.int_], rows: Array) -> Array:
         """What is likeliest of whitened rows (N,) to be something else, as large as an error model (5,) says."""
@@ -181,15 +183,15 @@ class ErrorGrid:
         return found
 
 
-def error_grid(observation: Observation, facts: Facts, rig: Array) -> ErrorGrid:
+def error_grid(observation: Observation, facts: Facts, rig: Callable[[Fit], Array]) -> ErrorGrid:
     """The error models of an observation.
 
     Parameters
     ----------
     observation : Observation
     facts : Facts
-    rig : (N, r)
-        Whitened sensitivities to what every rig has a little of, per standard deviation of it; ``r`` may be 0.
+    rig : Fit -> (N, r)
+        As in `ErrorGrid`.
     """
     rows, count = observation.rows, len(facts.branch)
     forces, photos = np.flatnonzero(rows.force), np.flatnonzero(~rows.force)

@@ -64,13 +64,14 @@ class Evidence(NamedTuple):
     """Log probability of the data, by the model alone (``plain``) and with something else besides (``rest``).
 
     Without something else: ``moved``: probability that displacements scatter beyond the log, and by how much if so (m);
-    ``rig``: probability that zero, length and camera are off by what they ordinarily are.
+    ``rig``: probability that zeros, length and camera are off by what they ordinarily are, and by how much if so, in
+    those standard deviations.
     """
 
     plain: float
     rest: float
     moved: tuple[float, float]
-    rig: float
+    rig: tuple[float, float]
 
 
 class WithColumn(NamedTuple):
@@ -119,7 +120,7 @@ def _summed(grid: ErrorGrid, fitted: Fit, terms: Sequence[Term], solved: Solved)
     found = []
     for k, one in enumerate(weight.T):
         moved = _moved(scales[:, 0], one) if fitted.beyond_log.size else (0.0, 0.0)
-        rig = float(one @ (scales[:, -1] > 0.0)) if grid.rig.shape[1] else 0.0
+        rig = _moved(scales[:, -1], one) if grid.rig(fitted).shape[1] else (0.0, 0.0)
         own_evidence = Evidence(float(plain[k]), float(disturbed[k]), moved, rig)
         found.append((own_evidence, WithColumn(*(part[k] for part in further))))
     return found
@@ -142,7 +143,7 @@ def something_else(grid: ErrorGrid, fitted: Fit) -> SomethingElse:
     best = int(np.argmax(weight))
     data, (residual, jacobian) = len(grid.photos) + len(grid.forces), fitted.as_logged
     move = conditional(solved, solved.flat, np.array([best]))[0][0]
-    size, beside = jacobian.shape[1], np.hstack([fitted.jacobian[:data, fitted.beyond_log], grid.rig])
+    size, beside = jacobian.shape[1], np.hstack([fitted.jacobian[:data, fitted.beyond_log], grid.rig(fitted)])
     by = solved.products.scales[best] * move[size:]
     own = by[: len(fitted.beyond_log)]
     if np.any(own):

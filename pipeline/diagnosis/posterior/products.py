@@ -16,11 +16,14 @@ from pipeline.diagnosis.fits.workbench import SCATTER
 Array = NDArray[np.float64]
 
 AS_RIGS_ARE = (0.0, 1.0)
-MOVED = {(0.0, 0.0): 0.1, AS_RIGS_ARE: 0.6, (SCATTER, 1.0): 0.2, (5.0 * SCATTER, 1.0): 0.1}
-"""Scatter of the displacements (m), and whether the rig is exact (0) or off by its standard deviations (1), all of it
-together, with probabilities beforehand: one that is exact in all but one thing is rarer than one that nobody aligned,
-and where displacements scatter nobody knows their zero better. An exact one is a simulation; where no photo at rest
-tells the zero, it is this number that decides how well K0 is known."""
+MOVED = {
+    (0.0, 0.0): 0.1, AS_RIGS_ARE: 0.45, (0.0, 3.0): 0.1, (SCATTER, 1.0): 0.15, (SCATTER, 3.0): 0.1,
+    (5.0 * SCATTER, 3.0): 0.1,
+}  # fmt: skip
+"""Scatter of the displacements (m), and how far the rig is off, in its standard deviations, all of it together: exact,
+as rigs are, or one of the worse; with probabilities beforehand. One that is exact in all but one thing is rarer than
+one that nobody aligned, and where displacements scatter nobody knows their zero better. An exact one is a simulation;
+where no photo at rest tells the zero, it is this number that decides how well K0 is known."""
 
 ASTRAY, ITS_SHARE = (20.0 * SCATTER, 100.0 * SCATTER), 0.25
 """Scatter of displacements, m, that no log has, and its probability among the four kinds of something else."""

@@ -110,7 +110,7 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
     for row, (at, middle, std) in enumerate(places, start=len(stated)):
         known[row, :several] = (middle - fitted.vector[at]) / std
         known[row, several + at - len(beyond)] = 1.0 / std
-    found = grid.products(columns[:data], known, fitted.jacobian[:data, beyond], more[:data])
+    found = grid.products(columns[:data], known, fitted.jacobian[:data, beyond], grid.rig(fitted), more[:data])
     return found, sum(_log_known(fitted)) - sum(float(np.log(std)) for _, _, std in places)
 
 
@@ -128,10 +128,9 @@ def _by_one_prior(fitted: Fit, schur: Array, pulls: Array) -> Array:
     """What the law adds to log p (G, d) by the one prior that the fit holds it by, up to a constant."""
     base = fitted.extension.base
     wide = base.law.prior().T @ base.law.prior()
-    whole, toward = schur + wide, pulls - (wide @ fitted.vector[: len(wide)])[:, None]
-    return np.asarray(
-        0.5 * (np.sum(toward * np.linalg.solve(whole, toward), axis=1) - np.linalg.slogdet(whole)[1][:, None])
-    )
+    half, log_det = _inverse_root(schur + wide)
+    toward = half @ (pulls - (wide @ fitted.vector[: len(wide)])[:, None])
+    return np.asarray(0.5 * (np.sum(toward**2, axis=1) - log_det[:, None]))
 
 
 def _that_matter(products: Products, rough: Array, *, beside: bool) -> NDArray[np.int_]:

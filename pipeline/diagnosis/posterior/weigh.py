@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 def error_models(observation: Observation, base: Fit, suspicion: Suspicion) -> ErrorGrid:
     """All error models of a test, about its base model."""
-    return error_grid(observation, base.extension.facts, ordinary(suspicion)[: observation.rows.count])
+    return error_grid(observation, base.extension.facts, partial(ordinary, observation, suspicion.terms))
 
 
 @dataclass(frozen=True, eq=False)
