@@ -7,12 +7,13 @@ through a true lens, the scale of the photos and the length of the cable. Every 
 
 Parameters, in this order: the unknowns of the law, K0 (1/m), errors of the axes and of the camera (only if the
 measurement states any of the axes), errors of the displacement of single steps (m; only where the log scatters, or has
-none), relative error of the stated px/mm, relative error of the stated length.
+none), of the zeros of displacement under load and force (m, N; where they are not taken as exact), relative error of
+the stated px/mm, relative error of the stated length.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +24,7 @@ from rod.characteristic import ParametricCurve
 from rod.compliance_law import moment_basis
 from rod.inverse.camera import DISTORTED, axes_off, scaled, tilt_of
 from rod.inverse.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_photographed
-from rod.inverse.prediction import Facts, Model, Observer
+from rod.inverse.prediction import Facts, Model, Observer, Prediction
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
@@ -45,6 +46,8 @@ PRESSED = 1e-3
 
 MOVED = "displacement_"
 """Begin of the name of the error of a step's displacement; its index follows."""
+
+ZEROS = ("displacement_zero", "force_zero")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +79,10 @@ class Base:
         Prior knowledge of the errors of their displacements.
     moved_first : (k,) m
         First guess of those errors.
+    pushed : tuple of int
+        Indices of the steps under load, which a wrong zero of the displacement moves.
+    zeros_std : (m, N) or empty
+        Prior knowledge of the zeros of displacement and force; exact where empty.
     """
 
     law: Law
@@ -92,13 +99,16 @@ class Base:
     moved: tuple[int, ...] = ()
     moved_std: Array = field(default_factory=lambda: np.zeros(0))
     moved_first: Array = field(default_factory=lambda: np.zeros(0))
+    pushed: tuple[int, ...] = ()
+    zeros_std: tuple[float, ...] = ()
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
         bend = () if self.straight else ("pre_curvature",)
         moved = (f"{MOVED}{i}" for i in self.moved)
-        return (*(f"stiffness_{i}" for i in range(self.law.size)), *bend, *self.axes, *moved, "scale", "length")
+        before = (*(f"stiffness_{i}" for i in range(self.law.size)), *bend, *self.axes, *moved)
+        return (*before, *ZEROS[: len(self.zeros_std)], "scale", "length")
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -117,15 +127,26 @@ class Base:
 
     def beyond_log(self, facts: Facts, exact: float) -> NDArray[np.int_]:
         """Positions in the vector of errors of displacements that the log tells to ``exact`` (m) or better."""
-        first = len(self.names) - 2 - len(self.moved)
-        return first + np.flatnonzero(facts.displacement_std[list(self.moved)] <= exact)
+        return np.arange(len(self.names))[self.moved_at][facts.displacement_std[list(self.moved)] <= exact]
+
+    @property
+    def zeros_at(self) -> NDArray[np.int_]:
+        """Positions in the vector of the zeros of displacement and force."""
+        return np.arange(len(self.names) - 2 - len(self.zeros_std), len(self.names) - 2)
+
+    @property
+    def moved_at(self) -> slice:
+        """Where in the vector the errors of displacements are."""
+        stop = len(self.names) - 2 - len(self.zeros_std)
+        return slice(stop - len(self.moved), stop)
 
     def shift(self, vector: Array, steps: int) -> Array | float:
         """Errors (steps,) of the displacements, m; a plain zero where all are exact."""
-        if not self.moved:
+        if not (self.moved or self.zeros_std):
             return 0.0
         shift = np.zeros(steps)
-        shift[list(self.moved)] = vector[-2 - len(self.moved) : -2]
+        shift[list(self.moved)] = vector[self.moved_at]
+        shift[list(self.pushed)] += vector[self.zeros_at[:1]].sum()
         return shift
 
     @property
@@ -142,7 +163,9 @@ class Base:
             first = self.names.index(self.axes[0])
             rows.extend(self._axis_rows() @ np.eye(size)[first : first + len(self.axes)])
         if self.moved:
-            rows.extend(np.eye(size)[-2 - len(self.moved) : -2] / self.moved_std[:, None])
+            rows.extend(np.eye(size)[self.moved_at] / self.moved_std[:, None])
+        if self.zeros_std:
+            rows.extend(np.eye(size)[self.zeros_at] / np.array(self.zeros_std)[:, None])
         return np.vstack([*rows, np.pad(self.law.prior(), ((0, 0), (0, size - count)))])
 
     def _axis_rows(self) -> Array:
@@ -158,19 +181,21 @@ class Base:
     @property
     def known(self) -> int:
         """Number of rows of prior knowledge that are not about the form of the law; they come first."""
-        return 2 + len(self.axes) + len(self.moved)
+        return 2 + len(self.axes) + len(self.moved) + len(self.zeros_std)
 
     def steps(self, facts: Facts) -> Array:
         """Steps (p,) of difference quotients: a thousandth of what would be a large change."""
         bend = [] if self.straight else [1e-4 * facts.curvature_scale]
         places = np.full(len(self.axes) + len(self.moved), 1e-6 * facts.length)
-        return np.asarray(np.r_[np.full(self.law.size, 1e-4), bend, places, 1e-6, 1e-6])
+        zeros = [1e-6 * facts.length, 1e-4 * facts.force_scale][: len(self.zeros_std)]
+        return np.asarray(np.r_[np.full(self.law.size, 1e-4), bend, places, zeros, 1e-6, 1e-6])
 
     def neutral(self, *, stiffness: float = 1.0, bend: float = 0.0) -> Array:
         """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m)."""
         rest = [] if self.straight else [self.first + bend]
         axes = np.zeros(len(self.axes))
-        return np.asarray(np.r_[self.law.stiffer(stiffness), rest, axes, self.moved_first, 0.0, 0.0])
+        zeros = np.zeros(len(self.zeros_std))
+        return np.asarray(np.r_[self.law.stiffer(stiffness), rest, axes, self.moved_first, zeros, 0.0, 0.0])
 
     def as_seen(self) -> Array:
         """Vector of a first guess by the photos alone; the neutral one where they do not tell."""
@@ -201,12 +226,19 @@ class Base:
         return Model(bending, shift=self.shift(vector, steps)).observed(self.observer(vector))
 
     def observer(self, vector: Array) -> Observer:
-        """First observer of every model: the camera with its scale, and the axes found on its photos."""
-        camera = scaled(float(vector[len(self.names) - 2]))
-        if not self.axes:
-            return camera
-        errors = axes_off(self.axis_errors(vector))
-        return lambda prediction, facts: errors(camera(prediction, facts), facts)
+        """First observer of every model: camera with its scale, axes found on its photos, zero of the load cell."""
+        seen = [scaled(float(vector[len(self.names) - 2]))]
+        if self.axes:
+            seen.append(axes_off(self.axis_errors(vector)))
+        zero = float(vector[self.zeros_at[1:]].sum())
+
+        def observer(prediction: Prediction, facts: Facts) -> Prediction:
+            for one in seen:
+                prediction = one(prediction, facts)
+            samples = tuple(held + zero for held in prediction.samples)
+            return replace(prediction, force=prediction.force + zero, samples=samples)
+
+        return observer
 
     def admissible(self, vector: Array) -> bool:
         """Whether nothing is absurd: stiffness within e^12 of the reference, scale and length within 30 %."""
@@ -264,6 +296,7 @@ def start(
         camera_foot_std=test.camera_foot_std,
         moved=moved,
         moved_std=facts.displacement_std[list(moved)],
+        pushed=facts.pushed,
         moved_first=np.array([_first_error(test, facts, i, 0.0 if straight else float(rest)) for i in moved]),
     )
 

@@ -172,19 +172,21 @@ def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:
     return extension, np.r_[basis.projected(rise), fitted.vector[count:]]
 
 
-def held_to(observation: Observation, fitted: Fit, scatter: float) -> Fit:
+def held_to(observation: Observation, fitted: Fit, scatter: float, zeros: tuple[float, ...] = ()) -> Fit:
     """A model with displacements under load held to ``scatter`` (m) beyond what the log tells of them.
 
+    Where ``zeros`` (m, N) are given, those of displacement and force are unknowns of that size from now on.
     Valleys of K0 are compared before: beside errors of displacements of its own each fits nearly as well.
     """
     extension, facts = fitted.extension, fitted.extension.facts
     base, pushed, std = extension.base, list(facts.pushed), facts.displacement_std.copy()
     std[pushed] = np.hypot(std[pushed], scatter)
-    moved, last = np.flatnonzero(std > DISPLACEMENT_STD), len(base.names) - 2
-    first, errors = last - len(base.moved), np.zeros(len(std))
-    errors[list(base.moved)] = fitted.vector[first:last]
-    other = replace(base, moved=tuple(moved.tolist()), moved_std=std[moved], moved_first=errors[moved])
-    start = np.r_[fitted.vector[:first], errors[moved], fitted.vector[last:]]
+    moved, at, errors = np.flatnonzero(std > DISPLACEMENT_STD), base.moved_at, np.zeros(len(std))
+    errors[list(base.moved)] = fitted.vector[at]
+    known = zeros or base.zeros_std
+    other = replace(base, moved=tuple(moved.tolist()), moved_std=std[moved], moved_first=errors[moved], zeros_std=known)
+    fresh = np.zeros(len(known) - len(base.zeros_std))
+    start = np.r_[fitted.vector[: at.start], errors[moved], fresh, fitted.vector[at.stop :]]
     found = fit_from(observation, replace(extension, base=other), start, fitted)
     return fitted if found.run.prediction is None else found
 

@@ -117,9 +117,11 @@ def _of_base(bends: Bends, extension: Extension, vector: Array, here: Model) -> 
     bends.at.extend(range(share.shape[1]))
     if (bend := base.pre_curvature_index) is not None:
         bends.by("pre_curvature", bend)
-    for k, step in enumerate(base.moved):
-        j = len(base.names) - 2 - len(base.moved) + k
+    for j, step in enumerate(base.moved, start=base.moved_at.start):
         bends.travel[step, j] = 1.0
+        bends.at.append(j)
+    for j in base.zeros_at[:1].tolist():
+        bends.travel[list(base.pushed), j] = 1.0
         bends.at.append(j)
     last = len(base.names) - 1
     bends.by("length", last, -bending.length / (1.0 + float(vector[last])))

@@ -92,9 +92,14 @@ class Fit:
 
     @property
     def as_logged(self) -> tuple[Array, Array]:
-        """Residual (N,) and sensitivities (N, q), to first order, with displacements as exact as the log tells them."""
-        at = self.beyond_log
+        """Residual (N,) and sensitivities (N, q), to first order, with displacements and zeros as exact as stated."""
+        at = self.beyond_stated
         return self.residual + self.jacobian[:, at] @ self.vector[at], np.delete(self.jacobian, at, axis=1)
+
+    @property
+    def beyond_stated(self) -> NDArray[np.int_]:
+        """Positions in the vector of errors that no statement of the data holds: of displacements, and of zeros."""
+        return np.concatenate([self.beyond_log, self.extension.base.zeros_at])
 
     @property
     def excess(self) -> Array:

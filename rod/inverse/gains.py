@@ -62,7 +62,7 @@ def _nuisances(test: MeasuredTest, fitted: Fit) -> dict[Source, Array]:
         for way in ("along", "across"):
             found[f"foot_{way}", -1] = beside * (unit[f"left_{way}"] + unit[f"right_{way}"])
         found["parallax", -1] = base.axis_parallax_std * unit["parallax"]
-    names = base.names[-2 - len(base.moved) : -2]
+    names = base.names[base.moved_at]
     for name, step, std in zip(names, base.moved, base.moved_std, strict=True):
         found["displacement", test.steps[step].step] = std * unit[name]
     return found

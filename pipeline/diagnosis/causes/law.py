@@ -4,7 +4,7 @@ nonlinear_stiffness  the law of the base model may have any form; a cause in the
 hysteresis           elements beside the law that slip, at once or gradually (see `rod.section.InternalFriction`)
 plastic_set          K0 grows with the largest curvature reached, where it was reached; the law moves along or stays
                      (see `rod.section`); or all along the cable, alike or in a half sine, with the largest of all;
-                     in proportion, beyond a threshold (``width``), or ever more slowly (``at``, its saturation)
+                     in proportion, beyond a threshold (``width``), ever more slowly or quickly (``at``, its saturation)
 stiffness_drift      all moments are multiplied by 1 + a g(step), g from 0 at the first step to n - 1 at the last
 
 Where nothing but the cable resists, moments multiplied alike multiply the force and leave the shapes as they were.
@@ -125,18 +125,19 @@ class PlasticSet(Cause):
         minimum between any two steps. On loading alone a set at each point is part of the law.
         """
         reach = 0.9 * facts.curvature_scale
-        plain = Variant(at_range=(0.0, MOST_SATURATED / reach), width_range=(0.0, reach))
+        plain = Variant(at_range=(-MOST_QUICKENED / reach, MOST_SATURATED / reach), width_range=(0.0, reach))
         late = [replace(plain, width=share * reach, tuned=("width",)) for share in (0.2, 0.5)]
         slows = replace(plain, at=1.0 / reach, width=0.1 * reach, tuned=("at", "width"))
+        quickens = replace(plain, at=-1.0 / reach, tuned=("at",))
         return tuple(
             replace(form, label=label, of_law=label in FORMS[:2] and not facts.returns)
             for label in (FORMS if len(facts.bends) else FORMS[:2])
-            for form in (plain, *late, slows)
+            for form in (plain, *late, slows, quickens)
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let ``amount`` of the largest excess curvature beyond the threshold stay."""
-        threshold, saturation = max(variant.width, 0.0), max(variant.at, 0.0)
+        threshold, saturation = max(variant.width, 0.0), variant.at
         form = FORMS.index(variant.label)
         if form > 1 and len(facts.bends):
             bends = amount * growth(np.maximum(facts.bends - threshold, 0.0), saturation)[0]
@@ -147,8 +148,9 @@ class PlasticSet(Cause):
         return replace(model, bending=replace(grows, set_saturation=saturation))
 
 
-MOST_SATURATED = 10.0
-"""Saturation (see `rod.section`) times the reach of the bends up to which it is sought: growth is over in a tenth."""
+MOST_QUICKENED, MOST_SATURATED = 3.0, 10.0
+"""Saturation (see `rod.section`), negative and positive, times the reach of the bends up to which it is sought: at the
+end it grows twenty times as fast as at first; growth is over in a tenth."""
 
 
 class StiffnessDrift(Cause):

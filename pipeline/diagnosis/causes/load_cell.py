@@ -52,11 +52,6 @@ def passed(share: Array, settling: float) -> Array:
     return np.asarray(np.expm1(-settling * share) / np.expm1(-settling))
 
 
-TARED = 1.5e-3
-"""Of the largest force: what is left of a zero that was set before the test, by the digits that are shown, creep and a
-kelvin of temperature: some hundredths of a per cent each of a capacity that is used by a tenth to a half."""
-
-
 class ForceOffset(Cause):
     """``force_offset``: the load cell was not zeroed."""
 
@@ -67,10 +62,6 @@ class ForceOffset(Cause):
     def plausible(self, facts: Facts) -> float:
         """Two percent of the largest force."""
         return 0.02 * facts.force_scale
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One, which every load cell has a little of."""
-        return (Variant(ordinary=TARED * facts.force_scale),)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount`` to every reading."""

@@ -16,8 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rod.inverse.cause import Cause, Variant
-from rod.inverse.observation import ZERO_STD
+from rod.inverse.cause import PLAIN, Cause, Variant
 from rod.inverse.prediction import Facts, Model
 from rod.support import Support
 
@@ -186,12 +185,11 @@ class DisplacementOffset(Cause):
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """Offset of the pushed steps; where there is a mounted step, also one that includes it.
 
-        A mounted cable is force-free wherever the zero of the rig lies, so the second form is no ordinary one.
+        A mounted cable is force-free wherever the zero of the rig lies.
         """
         if "mounted" not in facts.branch:
-            return (Variant(ordinary=ZERO_STD),)
-        pushed = Variant("between the mounted position and the first step", ordinary=ZERO_STD)
-        return (pushed, Variant("at every step", at=1.0))
+            return PLAIN
+        return (Variant("between the mounted position and the first step"), Variant("at every step", at=1.0))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount`` to the displacements."""

@@ -7,15 +7,12 @@ best goes on, and further forms are added where they may act together.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
 from pipeline.diagnosis.explanations.forms import as_one_form, with_more_forms
 from pipeline.diagnosis.explanations.free_profile import free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
-from pipeline.diagnosis.fits.ordinary import ordinary_terms
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
@@ -108,29 +105,11 @@ def _fit_form(
 ) -> Fit | None:
     """Fit with one form in the model, its place and width tuned too unless that stalls (traces of slip have kinks)."""
     found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
-    if found is not None and found.reduced_chi2 > FITS:
-        found = min(found, beside_rig(observation, found, suspicion), key=cost)
     if found is None or found.converged or not suspicion.terms[direction].variant.tuned:
         return found
     held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
     further = fit_from(observation, found.extension, found.vector, found, hopeless=hopeless)
     return min((one for one in (found, held, further) if one is not None and one.run.prediction is not None), key=cost)
-
-
-def beside_rig(observation: Observation, fitted: Fit, suspicion: Suspicion) -> Fit:
-    """The same model fitted from where it lies beside a rig that is a little off, as every rig is.
-
-    Held to an exact rig its numbers may run to their limits. The start is the law and K0 that photos show.
-    """
-    base, own = fitted.extension.base, fitted.extension.terms
-    rig = ordinary_terms(suspicion, fitted)
-    usual = [term.cause.plausible(fitted.extension.facts) for term in own]
-    wide = replace(fitted.extension, terms=(*own, *rig))
-    beside = fit_from(observation, wide, wide.start(base.as_seen(), (*usual, *np.zeros(len(rig)))), fitted)
-    if beside.run.prediction is None:
-        return fitted
-    alone = fit_from(observation, *wide.without(beside.vector, set(range(len(own), len(wide.terms)))), beside)
-    return fitted if alone.run.prediction is None else alone
 
 
 def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:

@@ -26,20 +26,16 @@ def beside_ordinary_rig(observation: Observation, fitted: Fit, suspicion: Suspic
 
     ``off``: their size, in usual ones.
     """
-    terms = ordinary_terms(suspicion, fitted, off)
-    wider = replace(fitted.extension, terms=(*fitted.extension.terms, *terms))
-    found = fit_from(observation, wider, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
-    return None if found.run.prediction is None else found
-
-
-def ordinary_terms(suspicion: Suspicion, fitted: Fit, off: float = 1.0) -> tuple[Term, ...]:
-    """What every rig has a little of, each of a size that is known, but what is in the model already."""
-    present = {term.cause.name for term in fitted.extension.terms}
-    return tuple(
+    base, present = fitted.extension.base, {term.cause.name for term in fitted.extension.terms}
+    terms = tuple(
         Term(term.cause, replace(form, known=off * form.ordinary / term.cause.plausible(fitted.extension.facts)))
         for term in suspicion.terms
         if (form := term.variant).ordinary > 0.0 and term.cause.name not in present
     )
+    zeros = tuple(off * std for std in base.zeros_std)
+    wider = replace(fitted.extension, base=replace(base, zeros_std=zeros), terms=(*fitted.extension.terms, *terms))
+    found = fit_from(observation, wider, np.r_[fitted.vector, np.zeros(len(terms))], fitted)
+    return None if found.run.prediction is None else found
 
 
 SEEN = 2.0
@@ -48,10 +44,15 @@ SEEN = 2.0
 
 def told(found: Fit) -> tuple[Finding, ...]:
     """Finding on what a rig is off by, as far as the data show it."""
-    parts = []
-    for k, term in enumerate(found.extension.terms):
-        amount, std = found.amount(k)
-        if np.isfinite(term.variant.known) and term.variant.ordinary > 0.0 and abs(amount) > SEEN * std:
-            size = (amount, std, term.cause.unit)
-            parts.append(Message("rig/ordinary.part", cause=word(term.cause.name), size=size))
+    extension, own = found.extension, np.sqrt(np.diag(found.covariance))
+    present = {term.cause.name for term in extension.terms if not np.isfinite(term.variant.known)}
+    small = [*zip(("displacement_offset", "force_offset"), ("m", "N"), extension.base.zeros_at.tolist(), strict=False)]
+    for at, term in zip(extension.amounts_at, extension.terms, strict=True):
+        if np.isfinite(term.variant.known) and term.variant.ordinary > 0.0:
+            small.append((term.cause.name, term.cause.unit, at))
+    parts = [
+        Message("rig/ordinary.part", cause=word(name), size=(float(found.vector[at]), float(own[at]), unit))
+        for name, unit, at in small
+        if name not in present and abs(found.vector[at]) > SEEN * own[at]
+    ]
     return (inferred("rig/ordinary", parts=parts),) if parts else ()

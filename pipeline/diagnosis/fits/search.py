@@ -121,7 +121,7 @@ def ordinary(observation: Observation, terms: tuple[Term, ...], fitted: Fit) -> 
     present = {term.cause.name for term in fitted.extension.terms}
     sizes = [(term, size) for term in terms if (size := term.variant.ordinary) > 0.0 and term.cause.name not in present]
     found = [size * direction(observation, fitted, term, amount=size) for term, size in sizes]
-    return np.array(found).reshape(len(found), -1).T[: observation.rows.count]
+    return np.array(found).reshape(len(found), len(fitted.residual)).T[: observation.rows.count]
 
 
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:

@@ -20,7 +20,7 @@ from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.base_fit import base_fit, held_to
 from rod.inverse.fit import Fit
-from rod.inverse.observation import Observation
+from rod.inverse.observation import ZERO_STD, Observation
 from rod.inverse.prediction import Facts, facts_of
 from rod.measurement import MeasuredTest
 
@@ -34,6 +34,17 @@ SCATTER = 1e-5
 """Of a displacement under load, m: a dial gauge or a spindle is read to so much, where photos tell the travel of a step
 to a micrometre. Fits hold displacements to that, so that a scatter is no misfit; whether they do scatter is weighed
 (`pipeline.diagnosis.posterior.error_grid`), and scores are those of displacements as the log tells them."""
+
+
+TARED = 1.5e-3
+"""Of the largest force: what is left of a zero that was set before the test, by the digits that are shown, creep and a
+kelvin of temperature: some hundredths of a per cent each of a capacity that is used by a tenth to a half."""
+
+
+def beside_errors(observation: Observation, fitted: Fit) -> Fit:
+    """A base model with the errors of displacements and zeros that every rig has as unknowns of their usual size."""
+    zeros = ZERO_STD, TARED * fitted.extension.facts.force_scale
+    return held_to(observation, fitted, SCATTER, zeros)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +121,7 @@ def prepare(
     if fitted.run.prediction is None:
         assert fitted.run.failed is not None
         return ended(fitted.run.failed)
-    return scored(test, observation, held_to(observation, fitted, SCATTER), causes, settings)
+    return scored(test, observation, beside_errors(observation, fitted), causes, settings)
 
 
 def scored(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.fits.extended import curve
-from pipeline.diagnosis.fits.workbench import Workbench, scored
+from pipeline.diagnosis.fits.workbench import Workbench, beside_errors, scored
 from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_open
 from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.posterior.detectable import Detectable, detectable
@@ -276,7 +276,7 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
         vector,
         near=made,
     )
-    return scored(test, observation, fitted, SUSPECTS, settings)
+    return scored(test, observation, beside_errors(observation, fitted), SUSPECTS, settings)
 
 
 def _table(plan: Plan, protocol: Protocol, settings: DiagnosisSettings) -> Array:

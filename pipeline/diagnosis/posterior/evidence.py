@@ -40,6 +40,7 @@ from pipeline.diagnosis.posterior.unknowns import (
     conditional,
     log_sum,
     mean_over_laws,
+    of_known_size,
     solved_alone,
     solved_for,
     solved_once,
@@ -120,7 +121,7 @@ def _summed(grid: ErrorGrid, fitted: Fit, terms: Sequence[Term], solved: Solved)
     found = []
     for k, one in enumerate(weight.T):
         moved = _moved(scales[:, 0], one) if fitted.beyond_log.size else (0.0, 0.0)
-        rig = _moved(scales[:, -1], one) if grid.rig(fitted).shape[1] else (0.0, 0.0)
+        rig = _moved(scales[:, -1], one) if len(of_known_size(grid, fitted)[1].T) else (0.0, 0.0)
         own_evidence = Evidence(float(plain[k]), float(disturbed[k]), moved, rig)
         found.append((own_evidence, WithColumn(*(part[k] for part in further))))
     return found
@@ -143,7 +144,7 @@ def something_else(grid: ErrorGrid, fitted: Fit) -> SomethingElse:
     best = int(np.argmax(weight))
     data, (residual, jacobian) = len(grid.photos) + len(grid.forces), fitted.as_logged
     move = conditional(solved, solved.flat, np.array([best]))[0][0]
-    size, beside = jacobian.shape[1], np.hstack([fitted.jacobian[:data, fitted.beyond_log], grid.rig(fitted)])
+    size, beside = jacobian.shape[1], np.hstack(of_known_size(grid, fitted))
     by = solved.products.scales[best] * move[size:]
     own = by[: len(fitted.beyond_log)]
     if np.any(own):
@@ -190,7 +191,7 @@ def _moments(solved: Solved, fitted: Fit, negligible: float) -> Moments:
     by_law = np.where(rest[:, None, None, None], 0.0, by_law)
     move, covariance = conditional(solved, by_law, kept)
     size = fitted.extension.size
-    own = np.delete(np.arange(size), fitted.beyond_log)
+    own = np.delete(np.arange(size), fitted.beyond_stated)
     moves, covariances = np.zeros((len(kept), size)), np.zeros((len(kept), size, size))
     moves[:, own] = move[:, : own.size]
     covariances[:, own[:, None], own] = covariance[:, : own.size, : own.size]

@@ -82,7 +82,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     a = fitted.vector[:size]
     laws = tuple(conditioned(schur[kept], pulls[kept], a, one) for one in fitted.extension.base.law.families)
     flat = common[:, None, None] + np.stack([one.evidence for one in laws], axis=1)
-    own = half[:, :, np.array(amounts, dtype=int) - size - len(fitted.beyond_log)].swapaxes(1, 2)
+    own = half[:, :, np.array(amounts, dtype=int) - size - len(fitted.beyond_stated)].swapaxes(1, 2)
     alone, moves, covariances = (own @ pull).swapaxes(1, 2)[:, None], [], []
     for one in laws:
         along = own @ across @ one.vectors
@@ -99,7 +99,7 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
     falls from rest is known besides (`rod.inverse.laws.SOFTER`).
     """
     data, several, base = len(grid.photos) + len(grid.forces), residuals.shape[1], fitted.extension.base
-    beyond, (residual, jacobian) = fitted.beyond_log, fitted.as_logged
+    beyond, (residual, jacobian) = fitted.beyond_stated, fitted.as_logged
     columns = np.hstack([residuals + (residual - fitted.residual)[:, None], jacobian])
     stated = np.delete(columns[data:], np.arange(base.known, len(base.prior)), axis=0)
     places = fitted.extension.places
@@ -110,8 +110,18 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
     for row, (at, middle, std) in enumerate(places, start=len(stated)):
         known[row, :several] = (middle - fitted.vector[at]) / std
         known[row, several + at - len(beyond)] = 1.0 / std
-    found = grid.products(columns[:data], known, fitted.jacobian[:data, beyond], grid.rig(fitted), more[:data])
+    found = grid.products(columns[:data], known, *of_known_size(grid, fitted), more[:data])
     return found, sum(_log_known(fitted)) - sum(float(np.log(std)) for _, _, std in places)
+
+
+def of_known_size(grid: ErrorGrid, fitted: Fit) -> tuple[Array, Array]:
+    """Whitened sensitivities of the data to displacements (N, m), per m, and to the rig (N, r), per usual error.
+
+    Displacements and zeros are unknowns of the fit, the rest of the rig is not.
+    """
+    data, base = len(grid.photos) + len(grid.forces), fitted.extension.base
+    zeros = fitted.jacobian[:data, base.zeros_at] * np.array(base.zeros_std)
+    return fitted.jacobian[:data, fitted.beyond_log], np.hstack([zeros, grid.rig(fitted)])
 
 
 def _inverse_root(H: Array) -> tuple[Array, Array]:

@@ -47,7 +47,7 @@ def test_scatter_that_the_log_tells_is_no_cause(name):
     moved = told.base.extension.base.moved
     assert moved == tuple(i for i, step in enumerate(test.steps) if step.branch != "mounted")
     # The photos tell all but the zero, in which the scatter of the steps is averaged; their own axes add a fifth.
-    std = np.sqrt(np.diag(told.base.covariance))[-2 - len(moved) : -2]
+    std = np.sqrt(np.diag(told.base.covariance))[told.base.extension.base.moved_at]
     assert np.all(std < 1.2 * SCATTER / np.sqrt(len(moved)))
 
 

@@ -18,6 +18,7 @@ from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, SHAPES, SLOW, 
 from pipeline.diagnosis.posterior.evidence import SIZES, as_told, evidence, evidences, moments
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
 from pipeline.diagnosis.posterior.products import MOVED
+from pipeline.diagnosis.posterior.unknowns import of_known_size
 from pipeline.diagnosis.posterior.weigh import weighed_draws
 from pipeline.diagnosis.posterior.words import verdict
 from pipeline.faults import faults_of_input
@@ -48,15 +49,29 @@ def covariance(grid, sizes):
     return whole
 
 
+def with_exact_zeros(bench):
+    """The base fit without the zeros among its unknowns."""
+    fitted, base = bench.base, bench.base.extension.base
+    at, rows = base.zeros_at, bench.observation.rows.count + base.known - 1 - np.arange(len(base.zeros_std))
+    return replace(
+        fitted,
+        extension=replace(fitted.extension, base=replace(base, zeros_std=())),
+        vector=np.delete(fitted.vector, at),
+        jacobian=np.delete(np.delete(fitted.jacobian, at, axis=1), rows, axis=0),
+        residual=np.delete(fitted.residual, rows),
+    )
+
+
 def test_products_are_those_of_dense_covariances(bench, grid):
     rng = np.random.default_rng(1)
     count = bench.observation.rows.count
     own, added, known = rng.normal(size=(count, 3)), rng.normal(size=(count, 2)), rng.normal(size=(4, 3))
-    displacements = bench.base.jacobian[:count, bench.base.beyond_log]
-    found = grid.products(own, known, displacements, added)
+    displacements, rig = of_known_size(grid, bench.base)
+    assert rig.shape[1] > 2  # zeros are unknowns of the fit, length and camera beside it
+    found = grid.products(own, known, displacements, rig, added)
     for k in rng.choice(len(found.log_det), 12, replace=False):
         dense = covariance(grid, found.sizes[k])
-        rows = np.hstack([own, np.hstack([displacements, grid.rig]) * found.scales[k]])
+        rows = np.hstack([own, np.hstack([displacements, rig]) * found.scales[k]])
         expected = rows.T @ np.linalg.solve(dense, rows)
         expected[:3, :3] += known.T @ known
         expected[3:, 3:] += np.eye(len(expected) - 3)
@@ -68,7 +83,7 @@ def test_products_are_those_of_dense_covariances(bench, grid):
 
 def test_probabilities_of_error_models_sum_to_one(bench, grid):
     count = bench.observation.rows.count
-    found = grid.products(np.ones((count, 1)), np.ones((1, 1)), *np.zeros((2, count, 0)))
+    found = grid.products(np.ones((count, 1)), np.ones((1, 1)), *np.zeros((3, count, 0)))
     for rest in (True, False):
         assert np.exp(found.log_prior[found.rest == rest]).sum() == pytest.approx(1.0)
     assert all(sum(chances.values()) == pytest.approx(1.0) for chances in (SLOW, HOLD, grid.hold, MOVED))
@@ -91,14 +106,15 @@ def test_a_level_told_by_few_samples_may_be_too_low():
 def test_a_cause_is_worth_what_its_amount_integrated_over_gives(bench, grid, sign):
     """Ratio of two evidences, as the mean over prior sizes of an integral over the amount, by quadrature."""
     rng = np.random.default_rng(2)
-    plain = replace(grid.plain, rig=np.zeros((bench.observation.rows.count, 0)))
+    plain = replace(grid.plain, rig=lambda _: np.zeros((bench.observation.rows.count, 0)))
     term = next(t for t in bench.suspicion.terms if t.cause.sign == sign and bench.suspicion.scores.norm.max() > 0.0)
     k = bench.suspicion.terms.index(term)
-    column, plausible = bench.suspicion.columns[:, k], term.cause.plausible(bench.facts)
+    base, plausible = with_exact_zeros(bench), term.cause.plausible(bench.facts)
+    column = bench.suspicion.columns[: len(base.residual), k]
     residual = np.zeros(len(column))
     residual[: bench.observation.rows.count] = rng.standard_normal(bench.observation.rows.count)
     residual += 3.0 / bench.suspicion.scores.norm[k] * column
-    fitted = replace(bench.base, residual=residual)
+    fitted = replace(base, residual=residual)
     own, added = evidence(plain, fitted, [term], column[:, None])
 
     def without(amount):
@@ -118,7 +134,9 @@ def test_several_residuals_of_one_model_are_weighed_as_each_alone(bench, grid):
     terms, columns = bench.suspicion.terms[::9], bench.suspicion.columns[:, ::9]
     drawn = np.zeros((len(bench.base.residual), 3))
     drawn[: bench.observation.rows.count] = np.random.default_rng(6).normal(size=(bench.observation.rows.count, 3))
-    together = evidences(grid, bench.base, drawn, terms, columns)
+    about, rig = grid, grid.rig(bench.base)
+    grid = replace(about, rig=lambda _: rig)  # drawn residuals are no model's, so nothing can be traced about them
+    together = evidences(about, bench.base, drawn, terms, columns)
     for residual, found in zip(drawn.T, together, strict=True):
         alone = evidence(grid, replace(bench.base, residual=residual), terms, columns)
         assert np.hstack(found[0]) == pytest.approx(np.hstack(alone[0]), rel=1e-9)
@@ -130,8 +148,9 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
 
     Those are averaged over all priors of the law by hand, and sums over all error models.
     """
-    rows, J, base = bench.observation.rows.count, bench.base.jacobian, bench.base.extension.base
-    one = replace(grid.plain, rig=np.zeros((rows, 0)))
+    exact = with_exact_zeros(bench)
+    rows, J, base = bench.observation.rows.count, exact.jacobian, exact.extension.base
+    one = replace(grid.plain, rig=lambda _: np.zeros((rows, 0)))
     weak = np.diag(1e-2 * np.linalg.norm(J, axis=0))
     other = np.r_[rows : rows + base.known, rows + len(base.prior) : len(J)]
     stated, size, precisions, norms = J[other].T @ J[other] + weak.T @ weak, base.law.size, [], []
@@ -145,11 +164,11 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
             precisions.append(precision)
             means.append(np.linalg.solve(precision, toward))
             norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * means[-1] @ toward)
-    models, found, logs = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((2, rows, 0))), [], []
+    models, found, logs = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((3, rows, 0))), [], []
     # displacements of a log that states what they scatter have priors of their own
     facts = replace(bench.facts, displacement_std=np.full(len(bench.facts.branch), SCATTER))
-    extension = replace(bench.base.extension, facts=facts)
-    fitted = replace(bench.base, extension=extension, vector=np.zeros(J.shape[1]), jacobian=np.vstack([J, weak]))
+    extension = replace(exact.extension, facts=facts)
+    fitted = replace(exact, extension=extension, vector=np.zeros(J.shape[1]), jacobian=np.vstack([J, weak]))
     drawn = np.random.default_rng(3).standard_normal((rows, 2))
     for column in drawn.T:
         residual = np.r_[column, np.zeros(len(J) - rows + len(weak))]
