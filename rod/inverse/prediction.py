@@ -235,14 +235,12 @@ Observer = Callable[[Prediction, Facts], Prediction]
 class Model:
     """The experiment as simulated, and how it is observed; observers act in order.
 
-    ``shift`` (n,) m is added to the displacements of the log, step by step. ``lean``: sines of the camera's tilts along
-    and across the chord that are among the observers.
+    ``shift`` (n,) m is added to the displacements of the log, step by step.
     """
 
     bending: BendingTest
     observers: tuple[Observer, ...] = ()
     shift: Array | float = 0.0
-    lean: tuple[float, float] = (0.0, 0.0)
 
     def observed(self, observer: Observer) -> Model:
         """Same experiment, one more observer at the end of the chain."""

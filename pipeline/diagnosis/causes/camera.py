@@ -26,7 +26,7 @@ from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model
 
 Array = NDArray[np.float64]
-USUAL, FAR = 3.0, 6.0
+USUAL, FAR = 3.0, 12.0
 """Camera to cable in lengths: usual, and farthest: a long lens, before which a tilt is hardly seen otherwise."""
 
 STEEP = 4.0
@@ -79,6 +79,10 @@ LEAN = 0.1
 """Of the usual tilt of a camera: a fifth of a degree, what a good spirit level leaves."""
 
 
+STEEPLY = "steep enough to shorten the picture"
+"""Label of a tilt in any direction that is more than its perspective."""
+
+
 class CameraTilt(Cause):
     """``camera_tilt``: the camera does not look straight down."""
 
@@ -93,44 +97,36 @@ class CameraTilt(Cause):
         return tilt_of(facts.length)
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Tilt along and across the chord, by perspective alone and steep, with the signed D^2 as ``width``, m^2."""
-        lean, square = LEAN * tilt_of(facts.length), facts.length**2
-        plain = (
-            Variant("along the chord", at=0.0, ordinary=lean),
-            Variant("across the chord", at=1.0, ordinary=lean),
+        """Perspective alone, along and across the chord; steep in any direction, with the signed D^2 as ``width``, m^2.
+
+        ``at`` is the direction, in right angles from the chord toward the bow.
+        """
+        ordinary, square = LEAN * tilt_of(facts.length), facts.length**2
+        steep = Variant(
+            STEEPLY,
+            width=USUAL**2 * square,
+            tuned=("at", "width"),
+            at_range=(-1.5, 1.5),
+            width_range=(-(FAR**2) * square, FAR**2 * square),
+            setting="steep",
         )
-        steep = tuple(
-            replace(
-                form,
-                label=f"{form.label}, steep",
-                ordinary=0.0,
-                width=USUAL**2 * square,
-                tuned=("width",),
-                width_range=(-(FAR**2) * square, FAR**2 * square),
-                setting="steep",
-                trace=trace,
-            )
-            for form in plain
+        return (
+            Variant("along the chord", at=0.0, ordinary=ordinary),
+            Variant("across the chord", at=1.0, ordinary=ordinary),
             # what grows with the square of the tilt does not change its sign, so neither trace tells of the other
-            for trace in (STEEP, -STEEP)
+            *(replace(steep, at=at, trace=trace) for at in (0.0, 0.5, 1.0, -0.5) for trace in (STEEP, -STEEP)),
         )
-        return (*plain, *steep)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """The scale falls by ``amount`` per metre along (``at`` 0) or across (``at`` 1) the chord.
-
-        Beside a tilt in the other direction the picture is sheared too: turned by both, a point that lies off along the
-        chord has sunk by the first turn when the second one moves it across (product of both rotations).
-        """
-        across = variant.at > 0.5
+        """The scale falls by ``amount`` per metre in a direction, and lengths with the square of the tilt."""
         sine = float(np.clip(amount * np.sqrt(abs(variant.width)), -STEEPEST, STEEPEST))
-        shorter, both = float(np.sqrt(1.0 - sine**2)), sine * model.lean[0 if across else 1]
-        own, other, sheared = (shorter, 1.0, -both) if variant.width >= 0.0 else (shorter**-2, 1.0 / shorter, both)
+        flat, (cosine, turned) = np.sqrt(1.0 - sine**2), (fn(0.5 * np.pi * variant.at) for fn in (np.cos, np.sin))
+        own, other = (flat, 1.0) if variant.width >= 0.0 else (flat**-2, 1.0 / flat)
 
         def move(x: Array, y: Array) -> tuple[Array, Array]:
-            if across:
-                return x * other / (1.0 + amount * y), (y * own + x * sheared) / (1.0 + amount * y)
-            return (x * own + y * sheared) / (1.0 + amount * x), y * other / (1.0 + amount * x)
+            along, across = cosine * x + turned * y, cosine * y - turned * x
+            nearer = 1.0 / (1.0 + amount * along)
+            along, across = own * nearer * along, other * nearer * across
+            return cosine * along - turned * across, cosine * across + turned * along
 
-        lean = model.lean[0] + (not across) * sine, model.lean[1] + across * sine
-        return replace(model.observed(seen_through(move)), lean=lean)
+        return model.observed(seen_through(move))
