@@ -178,8 +178,13 @@ def room(path: Path) -> tuple[str, str]:
     return parts[0], parts[1]
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_imports_run_from_right_to_left_only(path):
+def test_imports_run_from_right_to_left_only():
+    for path in SOURCES:
+        runs_left(path)
+
+
+def runs_left(path):
+    """In a room of a plan, and imports only from rooms to its left."""
     package, here = room(path)
     if here in ("__init__", "__main__"):
         return
@@ -190,12 +195,12 @@ def test_imports_run_from_right_to_left_only(path):
     for name in imports(path):
         top, _, rest = name.partition(".")
         target = rest.split(".")[0]
-        assert not (package == "rod" and top == "pipeline"), f"rod imports {name}"
+        assert not (package == "rod" and top == "pipeline"), f"{path} imports {name}"
         if top == package and target in order and target != here:
-            assert order[target] < order[here], f"{here} imports {name}, which is not to its left"
+            assert order[target] < order[here], f"{path} imports {name}, which is not to its left"
         if top in GUESTS:
-            assert here in GUESTS[top], f"{top} is a guest of {GUESTS[top]} alone, not of {here}"
-        assert package != "rod" or top in {"rod", "numpy", "scipy"} or top in STANDARD, f"rod imports {name}"
+            assert here in GUESTS[top], f"{top} is a guest of {GUESTS[top]} alone, not of {path}"
+        assert package != "rod" or top in {"rod", "numpy", "scipy"} or top in STANDARD, f"{path} imports {name}"
 
 
 @pytest.mark.parametrize("package", INSIDE)
@@ -226,14 +231,11 @@ STANDARD = {
 }
 
 
-@pytest.mark.parametrize(
-    "path",
-    sorted(p for top in ("rod", "pipeline", "tests", "fixtures") for p in (ROOT / top).rglob("*.py")),
-    ids=lambda p: str(p.relative_to(ROOT)),
-)
-def test_no_file_swallows_the_library(path):
-    lines = len(path.read_text(encoding="utf-8").splitlines())
-    assert lines <= LONGEST_FILE, f"{lines} lines: split it by noun"
+def test_no_file_swallows_the_library():
+    files = (path for top in ("rod", "pipeline", "tests", "fixtures") for path in (ROOT / top).rglob("*.py"))
+    lines = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
+    assert len(lines) > 500
+    assert {path: count for path, count in lines.items() if count > LONGEST_FILE} == {}, "split it by noun"
 
 
 def test_no_room_is_a_lumber_room():

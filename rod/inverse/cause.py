@@ -91,7 +91,7 @@ class Variant:
     def moved(self, numbers: dict[str, float]) -> Variant:
         """The same form elsewhere: ``at`` and ``width`` by the numbers that are given."""
         at = float(np.exp(numbers["at"])) if self.by_factors and "at" in numbers else numbers.get("at", self.at)
-        return replace(self, at=at, width=numbers.get("width", self.width))
+        return replace(self, at=at, width=numbers.get("width", self.width)) if numbers else self
 
     def scale(self, name: str) -> float:
         """Size of a large change of that number."""

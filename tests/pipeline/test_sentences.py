@@ -81,11 +81,16 @@ def strings(node):
 MODULES = [path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "pipeline").rglob("*.py"))]
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if not name.startswith(ELSEWHERE)])
-def test_no_sentence_is_written_into_a_room(module):
-    told = set(strings(ast.parse((ROOT / module).read_text(encoding="utf-8"))))
-    long = (text for text in told if len(re.findall(r"[A-Za-z]{2,}", text)) > 2 and re.search(r"[\w)}] [\w({]", text))
-    assert sorted(text for text in long if not NO_SENTENCES.search(text)) == []
+def is_sentence(text):
+    return len(re.findall(r"[A-Za-z]{2,}", text)) > 2 and re.search(r"[\w)}] [\w({]", text)
+
+
+def test_no_sentence_is_written_into_a_room():
+    rooms = [name for name in MODULES if not name.startswith(ELSEWHERE)]
+    assert len(rooms) > 100
+    for module in rooms:
+        told = set(strings(ast.parse((ROOT / module).read_text(encoding="utf-8"))))
+        assert [text for text in told if is_sentence(text) and not NO_SENTENCES.search(text)] == [], module
 
 
 SIZES = [(0.00488, 0.00017, "N m"), (0.7, 0.0014, "1/m")]

@@ -74,13 +74,12 @@ def test_amount_zero_changes_nothing_and_a_plausible_one_something(bench, name):
 
 
 @pytest.mark.parametrize("name", sorted(CONTRACT))
-@pytest.mark.parametrize("times", [-1e3, -30.0, 30.0, 1e3])
-def test_no_step_of_a_refit_makes_an_impossible_cable(bench, name, times):
+def test_no_step_of_a_refit_makes_an_impossible_cable(bench, name):
     """A refit of foreign data may step anywhere that the sign allows (a length of -1.1 m ended a diagnosis)."""
     facts, model, _ = bench
     cause = BY_NAME[name]
-    if cause.sign * times >= 0.0:
-        for variant in cause.variants(facts):
+    for times in (-1e3, -30.0, 30.0, 1e3):
+        for variant in cause.variants(facts) if cause.sign * times >= 0.0 else ():
             rod = cause.apply(model, times * cause.plausible(facts), variant, facts).bending.rod
             assert rod.length > 0.0 and np.all(rod.edges[1:-1] > 0.0)  # the outer ones are rigid pieces
 

@@ -8,7 +8,7 @@ import pytest
 from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
 from fixtures.hidden import hidden_test
 from pipeline.diagnosis import diagnose
-from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.diagnose import _data_at_fault
 from pipeline.diagnosis.fits.force_breaks import force_break
 from pipeline.diagnosis.fits.workbench import prepare
@@ -16,7 +16,7 @@ from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 
 SETTINGS = DiagnosisSettings()
-DRIFT = [cause for cause in CATALOGUE if cause.name == "force_drift"]
+DRIFT = [cause for cause in SUSPECTS if cause.name == "force_drift"]
 
 
 @pytest.fixture(scope="module")
@@ -34,14 +34,17 @@ def spoiled(test, change):
     return replace(test, steps=tuple(steps))
 
 
-def fault(test):
-    return _data_at_fault(prepare(faults_of_input(test), SETTINGS))
+def fault(test, causes=SUSPECTS):
+    return _data_at_fault(prepare(faults_of_input(test), SETTINGS, causes=causes))
 
 
 @pytest.mark.parametrize("protocol", ["six", "loop"])
-@pytest.mark.parametrize("factor", [0.5, 0.9, 2.0])
-def test_a_factor_from_one_step_on(honest, protocol, factor):
-    found = fault(spoiled(honest[protocol], lambda i, force: force * (factor if i >= 3 else 1.0)))
+@pytest.mark.parametrize(
+    ("factor", "rivals"), [(0.5, DRIFT), (0.9, SUSPECTS), (2.0, DRIFT)], ids=["half", "less", "twice"]
+)
+def test_a_factor_from_one_step_on(honest, protocol, factor, rivals):
+    """The smallest change is what any cause may come nearest to."""
+    found = fault(spoiled(honest[protocol], lambda i, force: force * (factor if i >= 3 else 1.0)), rivals)
     (finding,) = found.findings
     assert (finding.code, finding.level) == ("force/factor", "error")
     assert "from step 3 on" in finding.message and "by a factor of" in finding.message
@@ -66,9 +69,9 @@ def test_a_load_cell_that_died_is_left_out_and_not_multiplied(honest, protocol, 
     assert found.forces == dead and not found.corrections
 
 
-@pytest.mark.parametrize("turned", [{2}, {1, 2}, {4, 5, 6}])
-def test_forces_of_the_other_sign_are_turned_whichever_they_are(honest, turned):
-    found = fault(spoiled(honest["loop"], lambda i, force: -force if i in turned else force))
+@pytest.mark.parametrize(("turned", "rivals"), [({2}, SUSPECTS), ({1, 2}, SUSPECTS), ({4, 5, 6}, DRIFT)])
+def test_forces_of_the_other_sign_are_turned_whichever_they_are(honest, turned, rivals):
+    found = fault(spoiled(honest["loop"], lambda i, force: -force if i in turned else force), rivals)
     (finding,) = found.findings
     assert (finding.code, finding.level) == ("force/sign", "warning")
     assert found.corrections[0].steps == tuple(sorted(turned)) and found.corrections[0].factor == -1.0
