@@ -6,6 +6,7 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, SIX, THREE, hidden_test
 from fixtures.trials import f_error
+from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.profile import deviation, forms, largest_of, position_of, profile, wave
 from pipeline.diagnosis.explanations.single_cause import refit_one
@@ -16,7 +17,6 @@ from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.extension import Extension, Term
 from rod.inverse.fit import FITS, evaluated
-from tests.pipeline.diagnosis.among import among
 
 SETTINGS = DiagnosisSettings()
 PROFILES = ("pre_curvature_varying", "stiffness_varying")
@@ -96,8 +96,7 @@ def test_columns_of_profiles_are_those_of_difference_quotients(name, turned):
 
 def test_a_strong_profile_beside_another_cause_is_one_of_two_names():
     cable = Cable(K0_profile=step(1.5, 0.5), compliance=2e-4)
-    test = hidden_test(cable, SIX, largest=0.0138, seed=60403)
-    part, findings, _ = among(test, "pre_curvature_varying rig_compliance displacement_offset stiffness_varying")
+    part, findings, _ = diagnose(faults_of_input(hidden_test(cable, SIX, largest=0.0138, seed=60403)), None, SETTINGS)
     assert part.verdict == "two_causes", part.headline
     assert {cause.name for cause in part.causes} == {"pre_curvature_varying", "rig_compliance"}
     assert f_error(part.extended, cable)[0] < 0.02 and findings == ()

@@ -18,7 +18,6 @@ from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.posterior.explanation import explanation_of
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
-from tests.pipeline.diagnosis.among import among
 
 SETTINGS = DiagnosisSettings()
 
@@ -84,7 +83,7 @@ def test_a_weak_cause_beside_one_fifty_times_as_loud_is_needed_where_only_both_l
     amount = 0.0077
     cable = Cable(memory=Slipping((amount / 3.0, 2.0 * amount / 9.0), (1.0, 3.0)))  # slips at 1 and at 3 1/m
     test = hidden_test(cable, LOOP, largest=0.0138, seed=4, reading=Reading(scale_error=0.008))
-    part, _, _ = among(test, "hysteresis scale_error length_error lens_distortion camera_tilt")
+    part, _, _ = diagnose(faults_of_input(test), None, SETTINGS)
     assert part.verdict == "two_causes" and {cause.name for cause in part.causes} == {"hysteresis", "scale_error"}
     scale = next(cause for cause in part.causes if cause.name == "scale_error")
     assert abs(scale.estimate - 0.008) < 4.0 * scale.std
