@@ -171,24 +171,19 @@ class _Told:
         assert base.run.prediction is not None
         steps = [i for i, samples in enumerate(observation.forces) if samples.size]
         force = np.array([observation.forces[i].mean() for i in steps])
-        model = np.array([base.run.prediction.samples[i].mean() for i in steps])
+        model = np.array([base.run.steps[i].force for i in steps])
         alike = np.minimum(force * model, 0.0) + np.minimum(force**2, model**2)  # of the same sign, and not zero
         ratio = np.divide(force, model, out=np.full(len(steps), np.inf), where=alike > 0.0)
         nearest = steps[int(np.argmin(np.abs(np.log(ratio))))]
         priors = len(base.residual) - observation.rows.count
         is_force = np.r_[observation.rows.force, np.zeros(priors, dtype=bool)]
         kept = ~is_force | np.r_[observation.rows.step == nearest, np.ones(priors, dtype=bool)]
-        # a base model bent to wrong forces may be too far from what the photos ask for: then from its first guess
-        neutral = base.extension.base.neutral()
-        for begin, vector in ((base, base.vector), (None, neutral)):
-            found = fit(
-                observation,
-                base.extension,
-                vector,
-                near=base.run,
-                begin=begin,
-                kept=kept,
-            )
+        # a base model bent to wrong forces may be too far from what the photos ask for: then from its first guess; what
+        # its zeros took of them is no zero
+        bent = base.vector.copy()
+        bent[base.extension.base.zeros_at] = 0.0
+        for vector in (bent, base.extension.base.neutral()):
+            found = fit(observation, base.extension, vector, near=base.run, kept=kept)
             if found.converged:
                 break
         if not found.converged or found.run.prediction is None:

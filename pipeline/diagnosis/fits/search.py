@@ -8,7 +8,7 @@ enough for the linear model. Where only the observation changes, nothing is simu
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -116,8 +116,11 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, o
 def ordinary(observation: Observation, terms: tuple[Term, ...], fitted: Fit) -> Array:
     """Whitened traces (n, r) in the data of what every rig has a little of, each one standard deviation, beside a fit.
 
-    Of ``terms`` those that have an ordinary size, but what is in the model already.
+    Of ``terms`` those that have an ordinary size, but what is in the model already. A fit to similar data will do.
     """
+    here = whole_residual(observation, fitted.run.prediction, fitted.vector, fitted.extension.prior)
+    assert here is not None
+    fitted = replace(fitted, residual=here)
     present = {term.cause.name for term in fitted.extension.terms}
     sizes = [(term, size) for term in terms if (size := term.variant.ordinary) > 0.0 and term.cause.name not in present]
     found = [size * direction(observation, fitted, term, amount=size) for term, size in sizes]

@@ -134,9 +134,7 @@ def test_several_residuals_of_one_model_are_weighed_as_each_alone(bench, grid):
     terms, columns = bench.suspicion.terms[::9], bench.suspicion.columns[:, ::9]
     drawn = np.zeros((len(bench.base.residual), 3))
     drawn[: bench.observation.rows.count] = np.random.default_rng(6).normal(size=(bench.observation.rows.count, 3))
-    about, rig = grid, grid.rig(bench.base)
-    grid = replace(about, rig=lambda _: rig)  # drawn residuals are no model's, so nothing can be traced about them
-    together = evidences(about, bench.base, drawn, terms, columns)
+    together = evidences(grid, bench.base, drawn, terms, columns)
     for residual, found in zip(drawn.T, together, strict=True):
         alone = evidence(grid, replace(bench.base, residual=residual), terms, columns)
         assert np.hstack(found[0]) == pytest.approx(np.hstack(alone[0]), rel=1e-9)
