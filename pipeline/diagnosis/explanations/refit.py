@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.search import TRACE, Suspicion
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import Fit, fit_from
+from rod.inverse.fit import FAR, Fit, fit_from
 from rod.inverse.observation import Observation
 from rod.inverse.sensitivities import whole_residual
 from rod.inverse.simulation import run
@@ -66,6 +66,8 @@ class Addition:
         value = float(np.clip(bent, -SANE * usual, SANE * usual))
         if term.cause.sign > 0 and value <= 0.0:  # far from the noise the linear estimate says nothing of the sign
             value = share * usual
+        base, vector = self.base.extension.base, vector.copy()
+        vector[base.zeros_at] = 0.0  # what a model that lacks the term took for them is none
         return np.concatenate([vector, term.numbers(value)])
 
 
@@ -104,7 +106,9 @@ def fit_term(
         term = Term(term.cause, replace(term.variant, tuned=()))
     added = Addition(base, term, float(suspicion.scores.estimate[direction]), suspicion.columns[:, direction])
     best: Fit | None = None
-    for start in (linear_start(observation, added), *_elsewhere(added)):
+    for start, spare in ((linear_start(observation, added), False), *_elsewhere(added)):
+        if spare and best is not None and best.reduced_chi2 < FAR:
+            continue
         found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best = found
@@ -142,13 +146,18 @@ def _cost_at(observation: Observation, extension: Extension, vector: Array, near
     return np.inf if value is None else float(value @ value)
 
 
-def _elsewhere(added: Addition) -> list[Array]:
-    """Starts with the law and K0 that photos show, and with K0 of the other sign where it may be wrong."""
+def _elsewhere(added: Addition) -> list[tuple[Array, bool]]:
+    """Further starts, and whether they are spare ones for where no other leads near the data.
+
+    With the law and K0 that photos show, with K0 of the other sign where it may be wrong, and with a constant law.
+    """
     base, facts = added.base.extension.base, added.base.extension.facts
     at = base.pre_curvature_index
     if at is None or len(base.names) != len(added.base.vector):
         return []
     K0, seen, mirrored = float(added.base.vector[at]), base.as_seen(), base.neutral()
     mirrored[at] = -K0
-    starts = [seen] if abs(float(seen[at]) - K0) > ELSEWHERE * facts.curvature_scale else []
-    return [added.start(vector) for vector in (starts if "mounted" in facts.branch else [*starts, mirrored])]
+    found = [(seen, abs(float(seen[at]) - K0) <= ELSEWHERE * facts.curvature_scale)]
+    if "mounted" not in facts.branch:
+        found.append((mirrored, False))
+    return [(added.start(vector), spare) for vector, spare in (*found, (base.neutral(), True))]

@@ -38,10 +38,10 @@ def refits(
     kind, found = suspicion.causes[cause], list[Fit]()
     first = _strong_profile(observation, base, suspicion, cause) if isinstance(kind, Profile) else None
     if first is None:
-        best = _by_setting(observation, base, suspicion, cause, hopeless=rival + LEAST)
+        best = _by_kind(observation, base, suspicion, cause, hopeless=rival + LEAST)
         if kind.combines:
-            for setting, one in best.items():
-                best[setting] = with_more_forms(observation, one, kind, setting, hopeless=rival + LEAST)
+            for (setting, *_), one in [*best.items()]:
+                best[setting,] = with_more_forms(observation, one, kind, setting, hopeless=rival + LEAST)
         found = [one for one in best.values() if cost(one) < min(map(cost, best.values())) + LEAST]
     else:
         found = [with_more_forms(observation, first, kind, "", hopeless=rival + LEAST)]
@@ -68,16 +68,19 @@ def _strong_profile(observation: Observation, base: Fit, suspicion: Suspicion, c
     return None if first is None or first.reduced_chi2 < FITS else first
 
 
-def _by_setting(
+def _by_kind(
     observation: Observation,
     base: Fit,
     suspicion: Suspicion,
     cause: int,
     *,
     hopeless: float,
-) -> dict[str, Fit]:
-    """The best fit of a single form of a cause for each setting; empty where no form can be simulated."""
-    best: dict[str, Fit] = {}
+) -> dict[tuple[str, ...], Fit]:
+    """The best fit of a single form of a cause for each kind (`kinds`); empty where no form can be simulated.
+
+    Forms that may act together are one kind in each setting.
+    """
+    best: dict[tuple[str, ...], Fit] = {}
     enough: dict[str, int] = {}
     for direction in _first_forms(suspicion, cause):
         # a law of any form beside the wrong kind of a cause may leave no more than noise, so each kind is tried, and
@@ -88,10 +91,12 @@ def _by_setting(
         found = _fit_form(observation, base, suspicion, direction, hopeless=hopeless)
         if found is None:
             continue
-        if found.converged and found.reduced_chi2 < FITS:
+        freedom = len(found.residual) - found.extension.size
+        if found.converged and found.chi2 < freedom + 2.0 * np.sqrt(2.0 * freedom):
             enough[term.variant.label] = term.size
-        setting = term.variant.setting
-        best[setting] = min(best.get(setting, found), found, key=cost)
+        form = term.variant
+        kind = (form.setting,) if term.cause.combines else (form.setting, form.label, *form.tuned)
+        best[kind] = min(best.get(kind, found), found, key=cost)
     return best
 
 
