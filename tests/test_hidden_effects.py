@@ -39,7 +39,7 @@ BEYOND = {("three", name) for name in ("hysteresis", "force_offset", "bearing_fr
 """Needs more than ten times a plausible amount at four times the detectable one: no rig would have that."""
 
 UNSEEN: dict[str, set[str]] = {
-    "three": {"bearing_friction", "displacement_offset", "force_offset", "hysteresis", "rigid_ends"},
+    "three": {"bearing_friction", "camera_tilt", "displacement_offset", "force_offset", "hysteresis", "rigid_ends"},
     "six": {"hysteresis"},
     "loop": set(),
 }
