@@ -51,7 +51,7 @@ def test_each_half_of_a_pair_has_all_its_forms():
 
 
 def test_all_causes_that_are_likely_beside_one_are_tried(monkeypatch):
-    """Beside a K0 that varies an offset of the forces, six times what every load cell has, shows little more than others."""
+    """Beside a K0 that varies a force's zero, six times that of every rig, shows little more than others do."""
     cable, reading = HIDE["pre_curvature_varying"](0.15, Form("growing along the cable"))
     test = hidden_test(cable, LOOP, largest=LARGEST, seed=31, reading=replace(reading, force_offset=0.028))
     bench = prepare(faults_of_input(test), SETTINGS)
