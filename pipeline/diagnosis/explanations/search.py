@@ -24,7 +24,7 @@ from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
 from pipeline.diagnosis.explanations.single_cause import refits
-from pipeline.diagnosis.fits.search import Suspicion, suspect
+from pipeline.diagnosis.fits.search import Suspicion, beside_zeros, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
@@ -232,7 +232,8 @@ def searched(bench: Workbench) -> Search:
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
     silent = silent and first.word == "base"
-    hidden = hidden_pair(bench.suspicion) if silent else ()
+    about = beside_zeros(bench.base, bench.suspicion)
+    hidden = hidden_pair(about) if silent else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise
     fits = bench.base.reduced_chi2 < FITS
     if silent and fits and not hidden:
@@ -240,8 +241,9 @@ def searched(bench: Workbench) -> Search:
     search.singles()
     search.begun()
     singles = search.likeliest()
-    if singles and (search.pairs_speak(singles[0]) or hidden):
+    # beside a base model that stays the likeliest no pair is sought, unless two causes hide each other
+    if singles and (hidden or (search.posterior.word != "base" and search.pairs_speak(singles[0]))):
         if not hidden and search.posterior.word == "rest":
-            hidden = hidden_pair(bench.suspicion)
+            hidden = hidden_pair(about)
         search.pairs(singles, together(bench, hidden) if hidden else [])
     return search

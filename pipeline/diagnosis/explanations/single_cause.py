@@ -20,6 +20,10 @@ from rod.inverse.cause import Profile
 from rod.inverse.fit import FITS, Fit, fit_from
 from rod.inverse.observation import Observation
 
+ALSO = 9.2
+"""Chi-square, with two for each number, by which a form may fall short of the best of its cause and still be weighed:
+a likelihood of a hundredth."""
+
 
 def refits(
     observation: Observation,
@@ -42,7 +46,7 @@ def refits(
         if kind.combines:
             for (setting, *_), one in [*best.items()]:
                 best[setting,] = with_more_forms(observation, one, kind, setting, hopeless=rival + LEAST)
-        found = [one for one in best.values() if cost(one) < min(map(cost, best.values())) + LEAST]
+        found = [one for one in best.values() if cost(one) < min(map(cost, best.values())) + ALSO]
     else:
         found = [with_more_forms(observation, first, kind, "", hopeless=rival + LEAST)]
     if isinstance(kind, Profile) and found:
@@ -108,13 +112,15 @@ def _fit_form(
     *,
     hopeless: float,
 ) -> Fit | None:
-    """Fit with one form in the model, its place and width tuned too unless that stalls (traces of slip have kinks)."""
+    """Fit with one form in the model; place and width tuned unless that stalls (traces of slip have kinks)."""
     found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
-    if found is None or found.converged or not suspicion.terms[direction].variant.tuned:
+    if found is None or found.converged:
         return found
-    held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
-    further = fit_from(observation, found.extension, found.vector, found, hopeless=hopeless)
-    return min((one for one in (found, held, further) if one is not None and one.run.prediction is not None), key=cost)
+    tried = [found, fit_from(observation, found.extension, found.vector, found, hopeless=hopeless)]
+    if suspicion.terms[direction].variant.tuned:
+        held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
+        tried += [] if held is None else [held]
+    return min((one for one in tried if one.run.prediction is not None), key=cost)
 
 
 def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:

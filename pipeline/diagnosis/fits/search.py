@@ -112,6 +112,14 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, o
     return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
 
 
+def beside_zeros(fitted: Fit, suspicion: Suspicion) -> Suspicion:
+    """The scores with zeros of displacement and force known no better than any rig has them."""
+    at = fitted.beyond_log
+    left = fitted.residual + fitted.jacobian[:, at] @ fitted.vector[at]
+    scores = score(left, np.delete(fitted.jacobian, at, axis=1), suspicion.columns, visible=VISIBLE)
+    return replace(suspicion, scores=scores)
+
+
 @lru_cache(maxsize=32)
 def ordinary(observation: Observation, terms: tuple[Term, ...], fitted: Fit) -> Array:
     """Whitened traces (n, r) in the data of what every rig has a little of, each one standard deviation, beside a fit.
