@@ -88,7 +88,6 @@ class CameraTilt(Cause):
 
     name = "camera_tilt"
     unit = "1/m"
-    combines = True
     limited = True
     seat = "camera"
 
@@ -113,8 +112,13 @@ class CameraTilt(Cause):
         return (
             Variant("along the chord", at=0.0, ordinary=ordinary),
             Variant("across the chord", at=1.0, ordinary=ordinary),
-            # what grows with the square of the tilt does not change its sign, so neither trace tells of the other
-            *(replace(steep, at=at, trace=trace) for at in (0.0, 0.5, 1.0, -0.5) for trace in (STEEP, -STEEP)),
+            # what grows with the square of the tilt does not change its sign, so no trace tells of the others
+            *(
+                replace(steep, at=at, width=way * steep.width, trace=trace)
+                for at in (0.0, 0.5, 1.0, -0.5)
+                for way in (1.0, -1.0)
+                for trace in (STEEP, -STEEP)
+            ),
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:

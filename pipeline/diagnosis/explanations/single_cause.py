@@ -16,8 +16,9 @@ from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
+from rod.inverse.base_fit import settled
 from rod.inverse.cause import Profile
-from rod.inverse.fit import FITS, Fit, fit_from
+from rod.inverse.fit import FITS, Fit
 from rod.inverse.observation import Observation
 
 ALSO = 9.2
@@ -116,7 +117,7 @@ def _fit_form(
     found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
     if found is None or found.converged:
         return found
-    tried = [found, fit_from(observation, found.extension, found.vector, found, hopeless=hopeless)]
+    tried = [settled(observation, found)]
     if suspicion.terms[direction].variant.tuned:
         held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
         tried += [] if held is None else [held]

@@ -36,8 +36,8 @@ def plain():
 
 
 def test_a_form_stands_beside_itself_only_where_its_place_is_its_own(plain):
-    """Two opposite tilts of a camera together distort like a lens, which is no tilt; two spots are two spots."""
-    for name, again in (("camera_tilt", False), ("stiffness_varying", True)):
+    """Loads in opposite directions are none; two spots are two spots."""
+    for name, again in (("in_plane_load", False), ("stiffness_varying", True)):
         cause = next(cause for cause in SUSPECTS if cause.name == name)
         for variant in cause.variants(plain.facts):
             term, other = Term(cause, variant), Term(cause, replace(variant, trace=-variant.trace))
