@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.search import TRACE, Suspicion
+from pipeline.diagnosis.posterior.products import WORSE
 from rod.inverse.extension import Extension, Term
 from rod.inverse.fit import FAR, Fit, fit_from
 from rod.inverse.observation import Observation
@@ -26,9 +27,6 @@ SHARES = (1.0, 0.3, 0.1)
 
 SANE = 5.0
 """Plausible sizes: no refit starts from a larger amount, however far the linear model goes."""
-
-WORSE = 3.0
-"""Usual errors of the zeros of displacement and force: the worse rigs have that much, and no refit starts from more."""
 
 ELSEWHERE = 0.1
 """Of the curvature scale: a base model whose K0 is so far from what photos show has gone elsewhere."""
@@ -70,7 +68,7 @@ class Addition:
         if term.cause.sign > 0 and value <= 0.0:  # far from the noise the linear estimate says nothing of the sign
             value = share * usual
         base, vector = self.base.extension.base, vector.copy()
-        # what a model that lacks the term took for zeros is none
+        # what a model that lacks the term took for zeros, beyond those of the worse rigs, is none
         most = WORSE * np.array(base.zeros_std)
         vector[base.zeros_at] = np.clip(vector[base.zeros_at], -most, most)
         return np.concatenate([vector, term.numbers(value)])
