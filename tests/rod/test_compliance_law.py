@@ -7,7 +7,7 @@ from scipy.special import erf
 
 from rod.compliance_law import COEFFICIENTS, moment_basis, refreshed, splines
 from rod.inverse.laws import over_moments
-from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, Posterior, _inverse_root, averaged, priors
+from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, Posterior, averaged, priors
 from rod.measured_law import propagated
 from rod.stiffness_law import StiffnessLaw
 
@@ -265,19 +265,3 @@ def test_an_abscissa_along_a_law_that_is_hardly_stiff_at_all_rises(size):
             basis = refreshed(rise, known * np.eye(rise.basis.size), *moments, size=24)
             assert np.all(np.diff(basis.moments) > 0.0)
             rise, known = basis.law(basis.projected(rise) + 0.5 * size * rng.standard_normal(24)), 1e-2
-
-
-@pytest.mark.parametrize("rows", [30, 15])
-def test_root_of_an_inverse_where_data_tell_all_and_where_rounding_is_all_of_some(rows):
-    """Fifteen rows tell nothing of one in sixteen directions: a large variance there, neither negative nor infinite."""
-    for seed in range(8):  # of a singular matrix half have a triangular root by rounding
-        J = np.random.default_rng(seed).standard_normal((rows, 16))
-        H = J.T @ J
-        root, scales = _inverse_root(H)
-        shares = np.linalg.eigvalsh(root.T @ H @ root)
-        assert np.allclose(shares[-rows:], 1.0, atol=1e-6) and np.all(np.abs(shares) < 1.0 + 1e-6)
-        assert np.all(scales >= 16 * np.finfo(float).eps * scales.max())
-        if rows == 30:
-            assert np.log(scales).sum() == pytest.approx(np.linalg.slogdet(H)[1], rel=1e-12)
-        else:
-            assert np.sum(scales < 1e-12 * scales.max()) == 1
