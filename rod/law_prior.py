@@ -226,7 +226,10 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
     a : (p,)
     one : Family
     """
-    root, scales = _inverse_root(schur + one.fixed + one.form)
+    scales, axes = np.linalg.eigh(schur + one.fixed + one.form)
+    # where rounding is all that data and prior tell, it must not become a negative variance
+    scales = np.maximum(scales, len(a) * np.finfo(float).eps * scales[..., -1:])
+    root = axes / np.sqrt(scales)[..., None, :]
     share, turned = np.linalg.eigh(root.swapaxes(-1, -2) @ one.form @ root)
     vectors = root @ turned
     share, tau = np.clip(share, 0.0, 1.0)[..., None, :], TAUS[:, None]
@@ -240,25 +243,3 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
     log_det = np.sum(np.log(precisions), axis=-1) + np.sum(np.log(scales), axis=-1)[..., None]
     evidence = (one.log_norms - 0.5 * log_det)[..., None] + 0.5 * gained
     return Conditioned(vectors, precisions, toward / precisions[..., None], evidence)
-
-
-def _inverse_root(H: Array) -> tuple[Array, Array]:
-    """W (..., p, p) with W W' the inverse of H, and p numbers whose product is |H|, (..., p).
-
-    By a triangular root, in a fifth of the time that eigenvectors take, unless rounding is all that some of it is.
-    """
-    try:
-        lower = np.linalg.cholesky(H)
-        scales = np.einsum("...ii->...i", lower) ** 2
-        if np.all(np.min(scales, axis=-1) > KNOWN * np.max(scales, axis=-1)):
-            return np.linalg.inv(lower).swapaxes(-1, -2), scales
-    except np.linalg.LinAlgError:
-        pass
-    scales, axes = np.linalg.eigh(H)
-    # where rounding is all that data and prior tell, it must not become a negative variance
-    scales = np.maximum(scales, H.shape[-1] * np.finfo(float).eps * scales[..., -1:])
-    return axes / np.sqrt(scales)[..., None, :], scales
-
-
-KNOWN = 1e-9
-"""Of the largest: a pivot above is known to a millionth."""
