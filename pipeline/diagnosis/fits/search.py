@@ -114,10 +114,8 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, o
 
 def beside_zeros(fitted: Fit, suspicion: Suspicion) -> Suspicion:
     """The scores with zeros of displacement and force known no better than any rig has them."""
-    at = fitted.beyond_log
-    left = fitted.residual + fitted.jacobian[:, at] @ fitted.vector[at]
-    scores = score(left, np.delete(fitted.jacobian, at, axis=1), suspicion.columns, visible=VISIBLE)
-    return replace(suspicion, scores=scores)
+    known = fitted.without_errors(fitted.beyond_log)
+    return replace(suspicion, scores=score(*known, suspicion.columns, visible=VISIBLE))
 
 
 @lru_cache(maxsize=32)
