@@ -192,24 +192,29 @@ def lost_unseen(fitted_amount: float, variant: Variant, facts: Facts) -> float:
         return fitted_amount * float(_lost(variant, facts, np.array(interval)))
     left = 1.0 - min(interval / variant.at, 1.0 - 1e-9)
     square = (2.0 - left * (np.log(left) ** 2 - 2.0 * np.log(left) + 2.0)) / (1.0 - left)
-    return -float(np.log1p(-fitted_amount) / _decades(variant, facts) * np.sqrt(square))
+    return -_log_left(fitted_amount) / _log_span(variant, facts) * float(np.sqrt(square))
 
 
 def _lost(variant: Variant, facts: Facts, since: Array) -> Array:
     """Share of a moment that is lost a time after it came, per unit of amount; of a power of the time see `_taken`."""
     if variant.label in SLOWLY:
-        return np.asarray(np.log1p(since / variant.at) / _decades(variant, facts))
+        return np.asarray(np.log1p(since / variant.at) / _log_span(variant, facts))
     return np.asarray(-np.expm1(-since / variant.at))
 
 
-def _decades(variant: Variant, facts: Facts) -> float:
-    """Logarithm of the factor by which the longest hold is longer than ``at``."""
+def _log_span(variant: Variant, facts: Facts) -> float:
+    """log(1 + T / tau), T the longest hold."""
     return float(np.log1p(max(float(np.ptp(times)) for times in facts.hold_times) / variant.at))
 
 
 def _taken(variant: Variant, amount: float, lost: Array) -> Array:
     """Share of a moment that is lost: ``amount`` times `_lost`, or by a power of the time, (1 - amount)^lost left."""
-    return np.asarray(1.0 - max(1.0 - amount, 1e-9) ** lost if variant.label in SLOWLY else amount * lost)
+    return np.asarray(-np.expm1(lost * _log_left(amount)) if variant.label in SLOWLY else amount * lost)
+
+
+def _log_left(amount: float) -> float:
+    """Logarithm of the share of a force that is left after the longest hold: something always is."""
+    return float(np.log(max(1.0 - amount, 1e-9)))
 
 
 @lru_cache(maxsize=64)
