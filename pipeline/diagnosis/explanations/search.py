@@ -23,7 +23,7 @@ from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
-from pipeline.diagnosis.explanations.single_cause import refits
+from pipeline.diagnosis.explanations.single_cause import ALSO, refits
 from pipeline.diagnosis.fits.search import Suspicion, beside_zeros, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
@@ -35,9 +35,6 @@ from rod.inverse.fit import FITS, fit_from
 
 MATTERS = 0.1
 """Probability of a cause by the linear model from which causes are refitted at all: small effects are linear ones."""
-
-ALSO = 0.01
-"""Probability of a cause by the linear model from which it is refitted besides those that come near the best score."""
 
 LIKELIEST = 4
 """Refits, the likeliest first, that are weighed with something else besides; single causes that pairs begin with."""

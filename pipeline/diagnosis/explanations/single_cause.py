@@ -21,9 +21,8 @@ from rod.inverse.cause import Profile
 from rod.inverse.fit import FITS, Fit
 from rod.inverse.observation import Observation
 
-ALSO = 9.2
-"""Chi-square, with two for each number, by which a form may fall short of the best of its cause and still be weighed:
-a likelihood of a hundredth."""
+ALSO = 0.01
+"""Probability from which a cause is refitted besides those that come near the best score, a form beside the best."""
 
 
 def refits(
@@ -47,7 +46,9 @@ def refits(
         if kind.combines:
             for (setting, *_), one in [*best.items()]:
                 best[setting,] = with_more_forms(observation, one, kind, setting, hopeless=rival + LEAST)
-        found = [one for one in best.values() if cost(one) < min(map(cost, best.values())) + ALSO]
+        # half a cost is minus the logarithm of a likelihood
+        enough = min(map(cost, best.values()), default=np.inf) - 2.0 * np.log(ALSO)
+        found = [one for one in best.values() if cost(one) < enough]
     else:
         found = [with_more_forms(observation, first, kind, "", hopeless=rival + LEAST)]
     if isinstance(kind, Profile) and found:
