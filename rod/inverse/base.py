@@ -146,7 +146,7 @@ class Base:
             return 0.0
         shift = np.zeros(steps)
         shift[list(self.moved)] = vector[self.moved_at]
-        shift[list(self.pushed)] += vector[self.zeros_at[:1]].sum()
+        shift[list(self.pushed)] += vector[self.zeros_at[:1]].sum()  # none where zeros are exact
         return shift
 
     @property

@@ -9,9 +9,10 @@ chord frame is laid through the moved bearings, so chord and shape change togeth
     camera_tilt      p -> p / (1 + g . p)                   g: perspective terms along and across the chord, 1/m
 
 A tilt phi seen from the distance D has g = sin(phi) / D, and changes lengths by the square of phi as well, half a
-percent at 6 degrees, fifty times what a photo shows. A tilt that large has D^2 as a second number, positive where the
-camera is turned about the rig, cos(phi) along the tilt; negative where it leans where it stands and the rig is cut from
-the side of its picture, 1 / cos(phi)^2 along the tilt and 1 / cos(phi) across it.
+percent at 6 degrees, fifty times what a photo shows. A tilt that large has its direction and D^2 as further numbers, in
+place of one along and one across the chord; D^2 is positive where the camera is turned about the rig, cos(phi) along
+the tilt; negative where it leans where it stands and the rig is cut from the side of its picture, 1 / cos(phi)^2 along
+the tilt and 1 / cos(phi) across it.
 """
 
 from __future__ import annotations
@@ -79,10 +80,6 @@ LEAN = 0.1
 """Of the usual tilt of a camera: a fifth of a degree, what a good spirit level leaves."""
 
 
-STEEPLY = "steep enough to shorten the picture"
-"""Label of a tilt in any direction that is more than its perspective."""
-
-
 class CameraTilt(Cause):
     """``camera_tilt``: the camera does not look straight down."""
 
@@ -102,7 +99,7 @@ class CameraTilt(Cause):
         """
         ordinary, square = LEAN * tilt_of(facts.length), facts.length**2
         steep = Variant(
-            STEEPLY,
+            "steep enough to shorten the picture",
             width=USUAL**2 * square,
             tuned=("at", "width"),
             at_range=(-1.5, 1.5),

@@ -121,7 +121,7 @@ def _summed(grid: ErrorGrid, fitted: Fit, terms: Sequence[Term], solved: Solved)
     found = []
     for k, one in enumerate(weight.T):
         moved = _moved(scales[:, 0], one) if fitted.beyond_log.size else (0.0, 0.0)
-        rig = _moved(scales[:, -1], one) if len(of_known_size(grid, fitted)[1].T) else (0.0, 0.0)
+        rig = _moved(scales[:, -1], one) if scales.shape[1] > fitted.beyond_log.size else (0.0, 0.0)
         own_evidence = Evidence(float(plain[k]), float(disturbed[k]), moved, rig)
         found.append((own_evidence, WithColumn(*(part[k] for part in further))))
     return found
