@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from pipeline.diagnosis.posterior.hypotheses import SHARES
 from pipeline.diagnosis.posterior.products import AS_RIGS_ARE, MOVED
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.observation import residual
+from rod.inverse.simulation import run
 from tests.pipeline.diagnosis.among import among
 
 LEAN = 0.12 * tilt_of(Cable().length)
@@ -47,6 +50,34 @@ def test_nothing_is_named_where_a_rig_is_off_as_rigs_are(protocol, seed, names):
     assert size is not None
     zero, std = map(float, size.groups())
     assert abs(zero - 25.0) < 3.0 * std < 25.0
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.003, []), (0.02, ["force_offset"])])
+def test_a_load_cell_is_off_as_every_one_is_or_more(share, named):
+    """Of the largest force: what is left of a zero is told with its size, and one that was never set is a cause."""
+    reading = Reading(play=-2.5e-5, length_error=1.5e-3, tilt=(LEAN, -LEAN))
+    test = hidden_test(Cable(), LOOP, largest=LARGEST, seed=57, reading=reading)
+    zero = share * max(abs(step.force) for step in test.steps)
+    steps = (replace(one, force=one.force + zero, hold_forces=one.hold_forces + zero) for one in test.steps)
+    part, findings, _ = among(replace(test, steps=tuple(steps)), "")
+    assert [cause.name for cause in part.causes] == named, part.headline
+    if named:
+        assert part.causes[0].estimate == pytest.approx(zero, rel=0.2)
+    else:
+        told = {finding.code: finding.message for finding in findings}["rig/ordinary"]
+        size, std = map(float, re.search(r"force offset by (\S+) ± (\S+)\smN", told).groups())
+        assert abs(size - 1e3 * zero) < 3.0 * std < 1e3 * zero
+
+
+def test_columns_of_the_zeros_are_those_of_difference_quotients():
+    fitted = prepare(faults_of_input(hidden_test(Cable(), LOOP, largest=LARGEST, seed=58)), DiagnosisSettings())
+    observation, fitted = fitted.observation, fitted.base
+    for at, step in zip(fitted.extension.base.zeros_at, (1e-6, 1e-3), strict=True):
+        moved = fitted.vector + step * np.eye(len(fitted.vector))[at]
+        there = run(fitted.extension.model(moved), fitted.extension.facts, near=fitted.run).prediction
+        count = observation.rows.count
+        quotient = (fitted.residual[:count] - residual(observation, there)) / step
+        assert np.allclose(fitted.jacobian[:count, at], quotient, rtol=2e-3, atol=2e-3 * np.abs(quotient).max())
 
 
 def test_a_cause_is_named_beside_such_a_rig_and_the_rig_is_not():
