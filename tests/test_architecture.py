@@ -63,7 +63,7 @@ INSIDE = {
     "pipeline.diagnosis.fits": [
         ("search", "extended", "maps"),
         ("workbench",),
-        ("identified_again", "heldout", "force_breaks", "outlier", "ordinary"),
+        ("identified_again", "heldout", "force_breaks", "outlier"),
     ],
     "pipeline.diagnosis.posterior": [
         ("explanation", "products", "words"),

@@ -15,12 +15,11 @@ from pipeline.diagnosis.explanations.conclusion import Conclusion, conclusion_of
 from pipeline.diagnosis.explanations.pair_fits import together
 from pipeline.diagnosis.explanations.search import searched
 from pipeline.diagnosis.explanations.single_cause import refit_one
-from pipeline.diagnosis.fits import ordinary
 from pipeline.diagnosis.fits.force_breaks import EXPLAINED, FAULT, force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
-from pipeline.diagnosis.fits.workbench import Workbench, prepare
+from pipeline.diagnosis.fits.workbench import SCATTER, Workbench, prepare
 from pipeline.diagnosis.posterior.weigh import weighed
-from pipeline.diagnosis.presentation.findings import too_large
+from pipeline.diagnosis.presentation.findings import rig_told, too_large
 from pipeline.diagnosis.presentation.part import present
 from pipeline.faults import Faults, ForceCorrection
 from pipeline.identify import Identification
@@ -120,12 +119,13 @@ def _beside(bench: Workbench, conclusion: Conclusion) -> _Beside:
     chance, std = own.moved
     if chance >= 0.5:
         findings.append(inferred("log/displacement-scatter", std_m=std))
-    exact = None if chance >= 0.5 or conclusion.accepted is None else held_to(bench.observation, fitted, 0.0)
-    chance, off = own.rig
-    if chance < 0.5:
-        return _Beside(exact, tuple(findings))
-    rig = ordinary.beside_ordinary_rig(bench.observation, exact or fitted, bench.suspicion, off)
-    return _Beside(rig or exact, (*findings, *(() if rig is None else ordinary.told(rig))))
+    scatter = SCATTER if chance >= 0.5 or conclusion.accepted is None else 0.0
+    (chance, off), usual = own.rig, fitted.extension.base.rig_std
+    wide = tuple(off * std for std in usual) if chance >= 0.5 else usual
+    if scatter and wide == usual:
+        return _Beside(None, tuple(findings))
+    shown = held_to(bench.observation, fitted, scatter, wide)
+    return _Beside(shown, (*findings, *(rig_told(shown) if chance >= 0.5 else ())))
 
 
 def _told(correction: ForceCorrection) -> ForceCorrectionPart:

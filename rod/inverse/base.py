@@ -7,8 +7,8 @@ through a true lens, the scale of the photos and the length of the cable. Every 
 
 Parameters, in this order: the unknowns of the law, K0 (1/m), errors of the axes and of the camera (only if the
 measurement states any of the axes), errors of the displacement of single steps (m; only where the log scatters, or has
-none), of the zeros of displacement under load and force (m, N; where they are not taken as exact), relative error of
-the stated px/mm, relative error of the stated length.
+none), what every rig is off by (`RIG`; where it is not taken as exact), relative error of the stated px/mm, relative
+error of the stated length.
 """
 
 from __future__ import annotations
@@ -47,7 +47,9 @@ PRESSED = 1e-3
 MOVED = "displacement_"
 """Begin of the name of the error of a step's displacement; its index follows."""
 
-ZEROS = ("displacement_zero", "force_zero")
+RIG = ("displacement_zero", "force_zero", "length_beyond", "lean_along", "lean_across")
+"""What a rig is off by beyond all that is stated of it: zeros of displacement under load (m) and of force (N), relative
+error of the length, lean of the camera along and across the chord (1/m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +83,8 @@ class Base:
         First guess of those errors.
     pushed : tuple of int
         Indices of the steps under load, which a wrong zero of the displacement moves.
-    zeros_std : (m, N) or empty
-        Prior knowledge of the zeros of displacement and force; exact where empty.
+    rig_std : (5,) or empty
+        Prior knowledge of what the rig is off by, in the order of `RIG`; exact where empty.
     """
 
     law: Law
@@ -100,7 +102,7 @@ class Base:
     moved_std: Array = field(default_factory=lambda: np.zeros(0))
     moved_first: Array = field(default_factory=lambda: np.zeros(0))
     pushed: tuple[int, ...] = ()
-    zeros_std: tuple[float, ...] = ()
+    rig_std: tuple[float, ...] = ()
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -108,7 +110,7 @@ class Base:
         bend = () if self.straight else ("pre_curvature",)
         moved = (f"{MOVED}{i}" for i in self.moved)
         before = (*(f"stiffness_{i}" for i in range(self.law.size)), *bend, *self.axes, *moved)
-        return (*before, *ZEROS[: len(self.zeros_std)], "scale", "length")
+        return (*before, *RIG[: len(self.rig_std)], "scale", "length")
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -121,32 +123,40 @@ class Base:
         return (*self.axes, "scale")
 
     def axis_errors(self, vector: Array) -> Array:
-        """Errors (8,) of axes and camera in the order of `AXES`, m, relative and 1/m."""
+        """Errors (8,) of axes and camera in the order of `AXES`, m, relative and 1/m; the lean of the rig in them."""
         first = self.law.size + (not self.straight)
-        return np.asarray(vector[first : first + len(AXES)]) if self.axes else np.zeros(len(AXES))
+        errors = vector[first : first + len(AXES)].copy() if self.axes else np.zeros(len(AXES))
+        if self.rig_std:
+            errors[5:7] += vector[self.rig_at[3:]]
+        return np.asarray(errors)
 
     def beyond_log(self, facts: Facts, exact: float) -> NDArray[np.int_]:
         """Positions in the vector of errors of displacements that the log tells to ``exact`` (m) or better."""
         return np.arange(len(self.names))[self.moved_at][facts.displacement_std[list(self.moved)] <= exact]
 
     @property
-    def zeros_at(self) -> NDArray[np.int_]:
-        """Positions in the vector of the zeros of displacement and force."""
-        return np.arange(len(self.names) - 2 - len(self.zeros_std), len(self.names) - 2)
+    def rig_at(self) -> NDArray[np.int_]:
+        """Positions in the vector of what the rig is off by."""
+        return np.arange(len(self.names) - 2 - len(self.rig_std), len(self.names) - 2)
+
+    @property
+    def lengths_at(self) -> NDArray[np.int_]:
+        """Positions in the vector of relative errors of the length."""
+        return np.append(self.rig_at[2:3], len(self.names) - 1)
 
     @property
     def moved_at(self) -> slice:
         """Where in the vector the errors of displacements are."""
-        stop = len(self.names) - 2 - len(self.zeros_std)
+        stop = len(self.names) - 2 - len(self.rig_std)
         return slice(stop - len(self.moved), stop)
 
     def shift(self, vector: Array, steps: int) -> Array | float:
         """Errors (steps,) of the displacements, m; a plain zero where all are exact."""
-        if not (self.moved or self.zeros_std):
+        if not (self.moved or self.rig_std):
             return 0.0
         shift = np.zeros(steps)
         shift[list(self.moved)] = vector[self.moved_at]
-        shift[list(self.pushed)] += vector[self.zeros_at[:1]].sum()  # none where zeros are exact
+        shift[list(self.pushed)] += vector[self.rig_at[:1]].sum()  # none where the rig is exact
         return shift
 
     @property
@@ -164,8 +174,8 @@ class Base:
             rows.extend(self._axis_rows() @ np.eye(size)[first : first + len(self.axes)])
         if self.moved:
             rows.extend(np.eye(size)[self.moved_at] / self.moved_std[:, None])
-        if self.zeros_std:
-            rows.extend(np.eye(size)[self.zeros_at] / np.array(self.zeros_std)[:, None])
+        if self.rig_std:
+            rows.extend(np.eye(size)[self.rig_at] / np.array(self.rig_std)[:, None])
         return np.vstack([*rows, np.pad(self.law.prior(), ((0, 0), (0, size - count)))])
 
     def _axis_rows(self) -> Array:
@@ -181,21 +191,21 @@ class Base:
     @property
     def known(self) -> int:
         """Number of rows of prior knowledge that are not about the form of the law; they come first."""
-        return 2 + len(self.axes) + len(self.moved) + len(self.zeros_std)
+        return 2 + len(self.axes) + len(self.moved) + len(self.rig_std)
 
     def steps(self, facts: Facts) -> Array:
         """Steps (p,) of difference quotients: a thousandth of what would be a large change."""
         bend = [] if self.straight else [1e-4 * facts.curvature_scale]
         places = np.full(len(self.axes) + len(self.moved), 1e-6 * facts.length)
-        zeros = [1e-6 * facts.length, 1e-4 * facts.force_scale][: len(self.zeros_std)]
-        return np.asarray(np.r_[np.full(self.law.size, 1e-4), bend, places, zeros, 1e-6, 1e-6])
+        rig = [1e-6 * facts.length, 1e-4 * facts.force_scale, *[1e-6] * 3][: len(self.rig_std)]
+        return np.asarray(np.r_[np.full(self.law.size, 1e-4), bend, places, rig, 1e-6, 1e-6])
 
     def neutral(self, *, stiffness: float = 1.0, bend: float = 0.0) -> Array:
         """Vector of a first guess: constant stiffness (times ``stiffness``), and K0 (plus ``bend``, 1/m)."""
         rest = [] if self.straight else [self.first + bend]
         axes = np.zeros(len(self.axes))
-        zeros = np.zeros(len(self.zeros_std))
-        return np.asarray(np.r_[self.law.stiffer(stiffness), rest, axes, self.moved_first, zeros, 0.0, 0.0])
+        rig = np.zeros(len(self.rig_std))
+        return np.asarray(np.r_[self.law.stiffer(stiffness), rest, axes, self.moved_first, rig, 0.0, 0.0])
 
     def as_seen(self) -> Array:
         """Vector of a first guess by the photos alone; the neutral one where they do not tell."""
@@ -218,7 +228,7 @@ class Base:
     def model(self, vector: Array, *, steps: int = 0) -> Model:
         """The model at a parameter vector; ``steps`` of the test, which count where displacements are not exact."""
         bending = BendingTest(
-            self.length / (1.0 + float(vector[-1])),
+            self.length / float(np.prod(1.0 + vector[self.lengths_at])),
             self.characteristic(vector),
             self.pre_curvature(vector),
             elements=self.elements,
@@ -228,9 +238,9 @@ class Base:
     def observer(self, vector: Array) -> Observer:
         """First observer of every model: camera with its scale, axes found on its photos, zero of the load cell."""
         seen = [scaled(float(vector[len(self.names) - 2]))]
-        if self.axes:
+        if self.axes or self.rig_std:
             seen.append(axes_off(self.axis_errors(vector)))
-        zero = float(vector[self.zeros_at[1:]].sum())
+        zero = float(vector[self.rig_at[1:2]].sum())
 
         def observer(prediction: Prediction, facts: Facts) -> Prediction:
             for one in seen:

@@ -172,10 +172,10 @@ def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:
     return extension, np.r_[basis.projected(rise), fitted.vector[count:]]
 
 
-def held_to(observation: Observation, fitted: Fit, scatter: float, zeros: tuple[float, ...] = ()) -> Fit:
+def held_to(observation: Observation, fitted: Fit, scatter: float, rig: tuple[float, ...] = ()) -> Fit:
     """A model with displacements under load held to ``scatter`` (m) beyond what the log tells of them.
 
-    Where ``zeros`` (m, N) are given, those of displacement and force are unknowns of that size from now on.
+    What a ``rig`` is off by (`rod.inverse.base.RIG`) is unknown and of that size from now on, where it is given.
     Valleys of K0 are compared before: beside errors of displacements of its own each fits nearly as well.
     """
     extension, facts = fitted.extension, fitted.extension.facts
@@ -183,9 +183,9 @@ def held_to(observation: Observation, fitted: Fit, scatter: float, zeros: tuple[
     std[pushed] = np.hypot(std[pushed], scatter)
     moved, at, errors = np.flatnonzero(std > DISPLACEMENT_STD), base.moved_at, np.zeros(len(std))
     errors[list(base.moved)] = fitted.vector[at]
-    known = zeros or base.zeros_std
-    other = replace(base, moved=tuple(moved.tolist()), moved_std=std[moved], moved_first=errors[moved], zeros_std=known)
-    fresh = np.zeros(len(known) - len(base.zeros_std))
+    known = rig or base.rig_std
+    other = replace(base, moved=tuple(moved.tolist()), moved_std=std[moved], moved_first=errors[moved], rig_std=known)
+    fresh = np.zeros(len(known) - len(base.rig_std))
     start = np.r_[fitted.vector[: at.start], errors[moved], fresh, fitted.vector[at.stop :]]
     found = fit_from(observation, replace(extension, base=other), start, fitted)
     return fitted if found.run.prediction is None else found

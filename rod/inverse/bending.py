@@ -120,11 +120,11 @@ def _of_base(bends: Bends, extension: Extension, vector: Array, here: Model) -> 
     for j, step in enumerate(base.moved, start=base.moved_at.start):
         bends.travel[step, j] = 1.0
         bends.at.append(j)
-    for j in base.zeros_at[:1].tolist():
+    for j in base.rig_at[:1].tolist():
         bends.travel[list(base.pushed), j] = 1.0
         bends.at.append(j)
-    last = len(base.names) - 1
-    bends.by("length", last, -bending.length / (1.0 + float(vector[last])))
+    for j in base.lengths_at.tolist():
+        bends.by("length", j, -bending.length / (1.0 + float(vector[j])))
 
 
 def _of_profile(bends: Bends, extension: Extension, vector: Array, k: int, cause: Profile, here: Model) -> None:

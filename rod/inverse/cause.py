@@ -49,9 +49,6 @@ class Variant:
         where nothing is.
     rare : bool
         Whether few rigs have it so: it is sought, but says nothing of what would have been seen of the cause.
-    ordinary : float
-        Standard deviation, in the unit of the cause, of what every rig has of it because nobody sets or measures it
-        better. So much is among the errors of the data, and is not named.
     """
 
     label: str = ""
@@ -67,7 +64,6 @@ class Variant:
     known: float = np.inf
     of_law: bool = False
     rare: bool = False
-    ordinary: float = 0.0
 
     @property
     def has_place(self) -> bool:

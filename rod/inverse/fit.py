@@ -92,7 +92,7 @@ class Fit:
 
     @property
     def as_logged(self) -> tuple[Array, Array]:
-        """Residual (N,) and sensitivities (N, q), to first order, with displacements and zeros as exact as stated."""
+        """Residual (N,) and sensitivities (N, q), to first order, with displacements and rig as exact as stated."""
         return self.without_errors(self.beyond_stated)
 
     def without_errors(self, at: NDArray[np.int_]) -> tuple[Array, Array]:
@@ -101,8 +101,8 @@ class Fit:
 
     @property
     def beyond_stated(self) -> NDArray[np.int_]:
-        """Positions in the vector of errors that no statement of the data holds: of displacements, and of zeros."""
-        return np.concatenate([self.beyond_log, self.extension.base.zeros_at])
+        """Positions in the vector of errors that no statement of the data holds: of displacements, and of the rig."""
+        return np.concatenate([self.beyond_log, self.extension.base.rig_at])
 
     @property
     def excess(self) -> Array:

@@ -76,10 +76,6 @@ class LensDistortion(Cause):
         return model.observed(seen_through(move))
 
 
-LEAN = 0.1
-"""Of the usual tilt of a camera: a fifth of a degree, what a good spirit level leaves."""
-
-
 class CameraTilt(Cause):
     """``camera_tilt``: the camera does not look straight down."""
 
@@ -97,7 +93,7 @@ class CameraTilt(Cause):
 
         ``at`` is the direction, in right angles from the chord toward the bow.
         """
-        ordinary, square = LEAN * tilt_of(facts.length), facts.length**2
+        square = facts.length**2
         steep = Variant(
             "steep enough to shorten the picture",
             width=USUAL**2 * square,
@@ -107,8 +103,8 @@ class CameraTilt(Cause):
             setting="steep",
         )
         return (
-            Variant("along the chord", at=0.0, ordinary=ordinary),
-            Variant("across the chord", at=1.0, ordinary=ordinary),
+            Variant("along the chord", at=0.0),
+            Variant("across the chord", at=1.0),
             # what grows with the square of the tilt does not change its sign, so no trace tells of the others
             *(
                 replace(steep, at=at, width=way * steep.width, trace=trace)

@@ -167,10 +167,6 @@ class RigCompliance(Cause):
         return replace(model, bending=replace(model.bending, compliance=compliance, stiffening=stiffening))
 
 
-MEASURED = 1e-3
-"""Of a length: a cable is cut and measured with a steel rule, 0.3 mm of 300."""
-
-
 class DisplacementOffset(Cause):
     """``displacement_offset``: the zero of the displacement is wrong."""
 
@@ -207,10 +203,6 @@ class LengthError(Cause):
     def plausible(self, facts: Facts) -> float:
         """One percent."""
         return 0.01
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """One form."""
-        return (Variant(ordinary=MEASURED),)
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Shorten the cable by ``1 + amount``, to no less than a tenth."""

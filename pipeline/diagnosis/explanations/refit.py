@@ -68,9 +68,9 @@ class Addition:
         if term.cause.sign > 0 and value <= 0.0:  # far from the noise the linear estimate says nothing of the sign
             value = share * usual
         base, vector = self.base.extension.base, vector.copy()
-        # what a model that lacks the term took for zeros, beyond those of the worse rigs, is none
-        most = WORSE * np.array(base.zeros_std)
-        vector[base.zeros_at] = np.clip(vector[base.zeros_at], -most, most)
+        # what a model that lacks the term took for errors of the rig, beyond those of the worse rigs, are none
+        most = WORSE * np.array(base.rig_std)
+        vector[base.rig_at] = np.clip(vector[base.rig_at], -most, most)
         return np.concatenate([vector, term.numbers(value)])
 
 

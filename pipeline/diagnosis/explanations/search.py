@@ -24,12 +24,12 @@ from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
 from pipeline.diagnosis.explanations.single_cause import ALSO, refits
-from pipeline.diagnosis.fits.search import Suspicion, beside_zeros, suspect
+from pipeline.diagnosis.fits.search import Suspicion, beside_rig, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
-from pipeline.diagnosis.posterior.error_grid import ErrorGrid
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
-from pipeline.diagnosis.posterior.weigh import Weighed, error_models, refitted, weighed
+from pipeline.diagnosis.posterior.weigh import Weighed, refitted, weighed
 from rod.inverse.base_fit import settled
 from rod.inverse.fit import FITS, fit_from
 
@@ -51,7 +51,7 @@ class Search:
 
     def __init__(self, bench: Workbench) -> None:
         self.bench = bench
-        self.grid: ErrorGrid = error_models(bench.observation, bench.base, bench.suspicion)
+        self.grid: ErrorGrid = error_grid(bench.observation, bench.facts)
         self._about: dict[Explanation, Suspicion] = {}
         self._beside: dict[Explanation, Weighed] = {}
         self.causes = [cause for k, cause in enumerate(bench.suspicion.causes) if bench.suspicion.of(k).size]
@@ -229,7 +229,7 @@ def searched(bench: Workbench) -> Search:
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
     silent = silent and first.word == "base"
-    about = beside_zeros(bench.base, bench.suspicion)
+    about = beside_rig(bench.base, bench.suspicion)
     hidden = hidden_pair(about) if silent else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise
     fits = bench.base.reduced_chi2 < FITS

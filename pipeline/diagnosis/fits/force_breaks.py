@@ -179,9 +179,9 @@ class _Told:
         is_force = np.r_[observation.rows.force, np.zeros(priors, dtype=bool)]
         kept = ~is_force | np.r_[observation.rows.step == nearest, np.ones(priors, dtype=bool)]
         # a base model bent to wrong forces may be too far from what the photos ask for: then from its first guess; what
-        # its zeros took of them is no zero
+        # its errors of the rig took of them are none
         bent = base.vector.copy()
-        bent[base.extension.base.zeros_at] = 0.0
+        bent[base.extension.base.rig_at] = 0.0
         for vector in (bent, base.extension.base.neutral()):
             found = fit(observation, base.extension, vector, near=base.run, kept=kept)
             if found.converged:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,25 +111,10 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, o
     return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
 
 
-def beside_zeros(fitted: Fit, suspicion: Suspicion) -> Suspicion:
-    """The scores with zeros of displacement and force known no better than any rig has them."""
+def beside_rig(fitted: Fit, suspicion: Suspicion) -> Suspicion:
+    """The scores beside a rig that is off by no less than any rig is."""
     known = fitted.without_errors(fitted.beyond_log)
     return replace(suspicion, scores=score(*known, suspicion.columns, visible=VISIBLE))
-
-
-@lru_cache(maxsize=32)
-def ordinary(observation: Observation, terms: tuple[Term, ...], fitted: Fit) -> Array:
-    """Whitened traces (n, r) in the data of what every rig has a little of, each one standard deviation, beside a fit.
-
-    Of ``terms`` those that have an ordinary size, but what is in the model already. A fit to similar data will do.
-    """
-    here = whole_residual(observation, fitted.run.prediction, fitted.vector, fitted.extension.prior)
-    assert here is not None
-    fitted = replace(fitted, residual=here)
-    present = {term.cause.name for term in fitted.extension.terms}
-    sizes = [(term, size) for term in terms if (size := term.variant.ordinary) > 0.0 and term.cause.name not in present]
-    found = [size * direction(observation, fitted, term, amount=size) for term, size in sizes]
-    return np.array(found).reshape(len(found), len(fitted.residual)).T[: observation.rows.count]
 
 
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:

@@ -19,6 +19,7 @@ from pipeline.faults import Faults
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.base_fit import base_fit, held_to
+from rod.inverse.camera import tilt_of
 from rod.inverse.fit import Fit
 from rod.inverse.observation import ZERO_STD, Observation
 from rod.inverse.prediction import Facts, facts_of
@@ -40,11 +41,18 @@ TARED = 1.5e-3
 """Of the largest force: what is left of a zero that was set before the test, by the digits that are shown, creep and a
 kelvin of temperature: some hundredths of a per cent each of a capacity that is used by a tenth to a half."""
 
+CUT = 1e-3
+"""Of the length: a cable is cut and measured with a steel rule, 0.3 mm of 300."""
+
+LEAN = 0.1
+"""Of the usual tilt of a camera: a fifth of a degree, what a good spirit level leaves."""
+
 
 def beside_errors(observation: Observation, fitted: Fit) -> Fit:
-    """A base model with the errors of displacements and zeros that every rig has as unknowns of their usual size."""
-    zeros = ZERO_STD, TARED * fitted.extension.facts.force_scale
-    return held_to(observation, fitted, SCATTER, zeros)
+    """A base model with the errors of displacements and of the rig that are usual as unknowns of that size."""
+    facts = fitted.extension.facts
+    lean = LEAN * tilt_of(facts.length)
+    return held_to(observation, fitted, SCATTER, (ZERO_STD, TARED * facts.force_scale, CUT, lean, lean))
 
 
 @dataclass(frozen=True, eq=False)

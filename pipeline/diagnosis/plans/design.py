@@ -19,7 +19,7 @@ from pipeline.diagnosis.fits.workbench import Workbench, beside_errors, scored
 from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_open
 from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.posterior.detectable import Detectable, detectable
-from pipeline.diagnosis.posterior.weigh import error_models
+from pipeline.diagnosis.posterior.error_grid import error_grid
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 from pipeline.messages import DECIMAL, PER, Message, ended, entry, word
 from pipeline.result import Curve
@@ -187,7 +187,7 @@ def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:
     others = [
         (protocol, _table(plan, protocol, settings)) for protocol in protocols(bench.facts) if not protocol.turned
     ]
-    grid = error_models(bench.observation, bench.base, bench.suspicion)
+    grid = error_grid(bench.observation, bench.facts)
     found = detectable(grid, bench.observation, bench.base, bench.suspicion, power=settings.power)
     causes = [_cause_plan(bench, found, index, table, others, settings) for index in range(len(bench.suspicion.causes))]
     extent = curve(bench.base)

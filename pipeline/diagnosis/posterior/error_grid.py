@@ -25,9 +25,9 @@ In whitened rows the covariance is
     C = 1 + (slow^2 - 1) E + shapes^2 D       in the photos (E: slow errors and axes),
     C = 1 + hold^2 + forces^2 D'              for the means of the holds; what varies within a hold is as whitened,
 
-and displacements are further unknowns, known to ``moved``, as are the forms of causes that every rig has a little of
-(`rod.inverse.cause.Variant.ordinary`): too little to be named. Along the eigenvectors of D all other
-sizes cost a sum. Notation of the products: G grid points, o own columns, k added ones.
+and displacements, known to ``moved``, are further unknowns, as is what every rig is off by
+(`rod.inverse.base.RIG`), too little to be named. Along the eigenvectors of D all other sizes cost a sum. Notation of
+the products: G grid points, o own columns, k added ones.
 """
 
 from __future__ import annotations
@@ -43,7 +43,6 @@ from scipy.special import chdtri, ndtr
 
 from pipeline.diagnosis.posterior.products import Products, Spread, along, sums, with_rig
 from rod.inverse.common_errors import shared_light
-from rod.inverse.fit import Fit
 from rod.inverse.noise import by_axes, slow_errors
 from rod.inverse.observation import Observation, PhotoData
 from rod.inverse.prediction import Facts
@@ -108,8 +107,6 @@ class ErrorGrid:
     kinds : tuple of Kind
         Those of noise alone come first.
     hold : mapping of size -> probability
-    rig : Fit -> (N, r)
-        Whitened sensitivities of a fit to what every rig has a little of, per standard deviation of it; r may be 0.
     """
 
     photos: NDArray[np.int_]
@@ -118,7 +115,6 @@ class ErrorGrid:
     log_det: Array
     kinds: tuple[Kind, ...]
     hold: Mapping[float, float]
-    rig: Callable[[Fit], Array]
 
     @property
     def plain(self) -> ErrorGrid:
@@ -183,16 +179,8 @@ class ErrorGrid:
         return found
 
 
-def error_grid(observation: Observation, facts: Facts, rig: Callable[[Fit], Array]) -> ErrorGrid:
-    """The error models of an observation.
-
-    Parameters
-    ----------
-    observation : Observation
-    facts : Facts
-    rig : Fit -> (N, r)
-        As in `ErrorGrid`.
-    """
+def error_grid(observation: Observation, facts: Facts) -> ErrorGrid:
+    """The error models of an observation."""
     rows, count = observation.rows, len(facts.branch)
     forces, photos = np.flatnonzero(rows.force), np.flatnonzero(~rows.force)
     share, along = np.linalg.eigh(_slow_errors(observation, photos))
@@ -220,7 +208,7 @@ def error_grid(observation: Observation, facts: Facts, rig: Callable[[Fit], Arra
         spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
         kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / len(patterns)))
     log_det = np.array([np.sum(np.log(one)) for one in wide])
-    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), hold_sizes(observation), rig)
+    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), hold_sizes(observation))
 
 
 def hold_sizes(observation: Observation) -> dict[float, float]:

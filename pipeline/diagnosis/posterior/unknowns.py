@@ -115,13 +115,9 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
 
 
 def of_known_size(grid: ErrorGrid, fitted: Fit) -> tuple[Array, Array]:
-    """Whitened sensitivities of the data to displacements (N, m), per m, and to the rig (N, r), per usual error.
-
-    Displacements and zeros are unknowns of the fit, the rest of the rig is not.
-    """
-    data, base = len(grid.photos) + len(grid.forces), fitted.extension.base
-    zeros = fitted.jacobian[:data, base.zeros_at] * np.array(base.zeros_std)
-    return fitted.jacobian[:data, fitted.beyond_log], np.hstack([zeros, grid.rig(fitted)])
+    """Whitened sensitivities of the data to displacements (N, m), per m, and to the rig (N, r), per usual error."""
+    base, rows = fitted.extension.base, fitted.jacobian[: len(grid.photos) + len(grid.forces)]
+    return rows[:, fitted.beyond_log], rows[:, base.rig_at] * np.array(base.rig_std)
 
 
 def _inverse_root(H: Array) -> tuple[Array, Array]:

@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.begun import BEGUN
-from pipeline.diagnosis.fits.search import Suspicion, ordinary
-from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
+from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence, evidences
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
 from rod.inverse.fit import Fit
-from rod.inverse.observation import Observation
 from rod.inverse.prediction import Facts
 
 Array = NDArray[np.float64]
-
-
-def error_models(observation: Observation, base: Fit, suspicion: Suspicion) -> ErrorGrid:
-    """All error models of a test, about its base model."""
-    return error_grid(observation, base.extension.facts, partial(ordinary, observation, suspicion.terms))
 
 
 @dataclass(frozen=True, eq=False)

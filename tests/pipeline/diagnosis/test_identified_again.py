@@ -11,7 +11,6 @@ from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.identified_again import identified_again
-from pipeline.diagnosis.fits.ordinary import beside_ordinary_rig
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -68,11 +67,9 @@ def test_what_is_known_of_a_rig_stays_known():
     reading = Reading(length_error=2e-3, play=1e-5)
     test = hidden_test(Cable(), protocol, largest=0.03, seed=18, reading=reading)
     bench = prepare(faults_of_input(test), SETTINGS)
-    rig = beside_ordinary_rig(bench.observation, bench.base, bench.suspicion)
-    again = identified_again(bench.observation, rig).fitted
-    for term in range(len(rig.extension.terms)):
-        amount, std = rig.amount(term)
-        assert abs(again.amount(term)[0] - amount) < std
+    again, at = identified_again(bench.observation, bench.base).fitted, bench.base.extension.base.rig_at
+    std = np.sqrt(np.diag(bench.base.covariance))
+    assert at.size and np.all(np.abs(again.vector - bench.base.vector)[at] < std[at])
 
 
 @pytest.mark.parametrize(("amount", "width"), [(0.5, 0.3), (1.0, 0.35)])

@@ -69,10 +69,10 @@ def test_a_load_cell_is_off_as_every_one_is_or_more(share, named):
         assert abs(size - 1e3 * zero) < 3.0 * std < 1e3 * zero
 
 
-def test_columns_of_the_zeros_are_those_of_difference_quotients():
+def test_columns_of_the_rig_are_those_of_difference_quotients():
     fitted = prepare(faults_of_input(hidden_test(Cable(), LOOP, largest=LARGEST, seed=58)), DiagnosisSettings())
     observation, fitted = fitted.observation, fitted.base
-    for at, step in zip(fitted.extension.base.zeros_at, (1e-6, 1e-3), strict=True):
+    for at, step in zip(fitted.extension.base.rig_at, (1e-6, 1e-3, 1e-5, 1e-4, 1e-4), strict=True):
         moved = fitted.vector + step * np.eye(len(fitted.vector))[at]
         there = run(fitted.extension.model(moved), fitted.extension.facts, near=fitted.run).prediction
         count = observation.rows.count

@@ -22,6 +22,7 @@ from pipeline.diagnosis.posterior.unknowns import of_known_size
 from pipeline.diagnosis.posterior.weigh import weighed_draws
 from pipeline.diagnosis.posterior.words import verdict
 from pipeline.faults import faults_of_input
+from rod.inverse.base import RIG
 from rod.inverse.noise import by_axes
 from rod.law_prior import TAUS
 
@@ -49,13 +50,13 @@ def covariance(grid, sizes):
     return whole
 
 
-def with_exact_zeros(bench):
-    """The base fit without the zeros among its unknowns."""
+def with_exact_rig(bench):
+    """The base fit without what a rig is off by among its unknowns."""
     fitted, base = bench.base, bench.base.extension.base
-    at, rows = base.zeros_at, bench.observation.rows.count + base.known - 1 - np.arange(len(base.zeros_std))
+    at, rows = base.rig_at, bench.observation.rows.count + base.known - 1 - np.arange(len(base.rig_std))
     return replace(
         fitted,
-        extension=replace(fitted.extension, base=replace(base, zeros_std=())),
+        extension=replace(fitted.extension, base=replace(base, rig_std=())),
         vector=np.delete(fitted.vector, at),
         jacobian=np.delete(np.delete(fitted.jacobian, at, axis=1), rows, axis=0),
         residual=np.delete(fitted.residual, rows),
@@ -67,7 +68,7 @@ def test_products_are_those_of_dense_covariances(bench, grid):
     count = bench.observation.rows.count
     own, added, known = rng.normal(size=(count, 3)), rng.normal(size=(count, 2)), rng.normal(size=(4, 3))
     displacements, rig = of_known_size(grid, bench.base)
-    assert rig.shape[1] > 2  # zeros are unknowns of the fit, length and camera beside it
+    assert rig.shape[1] == len(RIG)
     found = grid.products(own, known, displacements, rig, added)
     for k in rng.choice(len(found.log_det), 12, replace=False):
         dense = covariance(grid, found.sizes[k])
@@ -106,19 +107,18 @@ def test_a_level_told_by_few_samples_may_be_too_low():
 def test_a_cause_is_worth_what_its_amount_integrated_over_gives(bench, grid, sign):
     """Ratio of two evidences, as the mean over prior sizes of an integral over the amount, by quadrature."""
     rng = np.random.default_rng(2)
-    plain = replace(grid.plain, rig=lambda _: np.zeros((bench.observation.rows.count, 0)))
     term = next(t for t in bench.suspicion.terms if t.cause.sign == sign and bench.suspicion.scores.norm.max() > 0.0)
     k = bench.suspicion.terms.index(term)
-    base, plausible = with_exact_zeros(bench), term.cause.plausible(bench.facts)
+    base, plausible = with_exact_rig(bench), term.cause.plausible(bench.facts)
     column = bench.suspicion.columns[: len(base.residual), k]
     residual = np.zeros(len(column))
     residual[: bench.observation.rows.count] = rng.standard_normal(bench.observation.rows.count)
     residual += 3.0 / bench.suspicion.scores.norm[k] * column
     fitted = replace(base, residual=residual)
-    own, added = evidence(plain, fitted, [term], column[:, None])
+    own, added = evidence(grid.plain, fitted, [term], column[:, None])
 
     def without(amount):
-        return evidence(plain, replace(fitted, residual=residual - amount * column))[0].plain
+        return evidence(grid.plain, replace(fitted, residual=residual - amount * column))[0].plain
 
     std = 1.0 / bench.suspicion.scores.norm[k]
     tried, fine = np.linspace(-12.0, 18.0, 31) * std, np.linspace(-12.0, 18.0, 300_001) * std
@@ -146,9 +146,9 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
 
     Those are averaged over all priors of the law by hand, and sums over all error models.
     """
-    exact = with_exact_zeros(bench)
+    exact = with_exact_rig(bench)
     rows, J, base = bench.observation.rows.count, exact.jacobian, exact.extension.base
-    one = replace(grid.plain, rig=lambda _: np.zeros((rows, 0)))
+    one = grid.plain
     weak = np.diag(1e-2 * np.linalg.norm(J, axis=0))
     other = np.r_[rows : rows + base.known, rows + len(base.prior) : len(J)]
     stated, size, precisions, norms = J[other].T @ J[other] + weak.T @ weak, base.law.size, [], []
