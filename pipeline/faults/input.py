@@ -147,15 +147,32 @@ def _mismatch(test: MeasuredTest) -> dict[int, float]:
 def _order_of_photos(found: Faults) -> Faults:
     """Chords fit the displacements in another order than the one given: each photo goes to the step that it fits.
 
-    A cable that is pushed further has a shorter chord, whatever rig and cable do. Steps of one displacement (up and
-    down) cannot be told apart by it: a photo that may be of either is left out.
+    A cable that is pushed further has a shorter chord, whatever rig and cable do; where the bearing moves one way, play
+    and a yielding frame change nothing of that. Steps of one displacement (up and down) cannot be told apart by it: a
+    photo that may be of either is left out.
     """
-    test, (used, displacement, chord) = found.test, _logged(found.test, without=found.photos)
+    used, displacement, _ = _logged(found.test, without=found.photos)
+    travel = float(np.ptp(displacement)) if used else 0.0
+    whole = _put_in_order(found.test, used, MISMATCH * travel)
+    if whole.findings:
+        return whole
+    for branch in ("loading", "unloading"):
+        own = [i for i in used if found.test.steps[i].branch == branch]
+        whole = whole.joined(_put_in_order(whole.test, own, OF_ONE * travel, spread=ALONE))
+    return whole
+
+
+def _put_in_order(test: MeasuredTest, used: list[int], limit: float, *, spread: float = 0.0) -> Faults:
+    """Photos of some steps at those that they fit, where chords are off by more than a limit (m) as they are given.
+
+    ``spread``: by more than so many times what they differ by in their order, too.
+    """
+    displacement, chord = (np.array([getattr(test.steps[i], name) for i in used]) for name in ("displacement", "chord"))
     if len(used) < 2:
         return Faults(test)
     by_log, by_photo = np.argsort(displacement, kind="stable"), np.argsort(-chord, kind="stable")
     sums = chord[by_photo] + displacement[by_log]
-    limit = MISMATCH * float(np.ptp(displacement))
+    limit = max(limit, spread * float(np.ptp(sums)))
     wrong = np.abs(chord + displacement - np.median(sums)) > limit
     if not limit > 0.0 or wrong.sum() < 2 or np.any(np.abs(sums - np.median(sums)) > limit):
         return Faults(test)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fixtures.continuum import Cable
-from fixtures.hidden import LOOP, SIX, Reading, hidden_test
+from fixtures.hidden import LOOP, SIX, Protocol, Reading, hidden_test
 from fixtures.trials import f_error
 from pipeline.diagnosis import diagnose
 from pipeline.faults import faults_of_input
@@ -45,6 +45,27 @@ def test_photos_out_of_order(honest):
     assert [finding.code for finding in findings] == ["photo/order"]
     assert "2, 4" in findings[0].message
     assert (part.verdict, part.left_out_photos) == ("adequate", [])
+
+
+def test_neighbours_out_of_order_are_put_in_order_and_play_is_not():
+    """Steps of an eighth of the travel, whose chords are off by less than play and a yielding frame may make of a loop.
+
+    Play of 0.3 mm sets the chords of the way back apart from those of the way out.
+    """
+    shares = (*(i / 8 for i in range(9)), 7 / 8, 5 / 8, 3 / 8)
+    many = hidden_test(
+        Cable(), Protocol(shares, ("mounted", *("loading",) * 8, *("unloading",) * 3)), largest=0.0138, seed=23
+    )
+    swapped = with_steps(many, step5=picture(many.steps[6]), step6=picture(many.steps[5]))
+    found = faults_of_input(swapped)
+    assert codes(found) == ["photo/order"] and found.moved == {5: 6, 6: 5}
+    assert [step.chord for step in found.test.steps] == [step.chord for step in many.steps]
+    late = {
+        f"step{step.step}": {"displacement": step.displacement - 3e-4}
+        for step in many.steps
+        if step.branch == "unloading"
+    }
+    assert codes(faults_of_input(with_steps(many, **late))) == []
 
 
 def test_photos_in_reversed_order_are_put_in_order(honest):
