@@ -30,6 +30,9 @@ WITH_FORCE = "that grows with the force"
 BY_STEP, SCATTER = "differing from step to step", 0.3
 """Label of friction that differs, and by which share of it (standard deviation) beforehand: an assumption."""
 
+UNEQUAL = "of another moment at each bearing"
+"""Label of bearings that rub differently: how much goes to the left one is tuned, from all to nothing."""
+
 SIDES = ("at the left bearing", "at the right bearing")
 """Labels of what one bearing has alone: a dirty one, a clamp, a cable that is led in."""
 
@@ -55,16 +58,18 @@ class BearingFriction(Cause):
         return 0.03 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both bearings alike, slipping at once or only after they have been turned by some angle; or one of them.
+        """Both bearings alike, slipping at once or only after they have been turned by some angle; or each by itself.
 
         The friction of a seal is one moment, that of a journal grows with the force on it.
         """
-        yielding = Variant("that yields before it slips", at=0.03, tuned=("at",), at_range=(0.004, 0.1))
+        turned = Variant(at=0.03, tuned=("at",), at_range=(0.001, 0.1), by_factors=True)
+        unequal = replace(turned, label=UNEQUAL, tuned=("at", "width"), width_range=(-1.0, 1.0), rare=True)
         return (
             Variant("that slips at once"),
             Variant(WITH_FORCE),
-            yielding,
-            *(Variant(side, rare=True) for side in SIDES),
+            replace(turned, label="that yields before it slips"),
+            replace(unequal, width=0.5),
+            replace(unequal, width=-0.5),
         )
 
     def by_step(self, amount: float, facts: Facts) -> tuple[tuple[Variant, ...], ...]:
@@ -78,9 +83,9 @@ class BearingFriction(Cause):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give both bearings the Coulomb moment ``amount``, reached after a turn of ``at`` rad where that is not 0.
 
-        A moment that grows with the force is ``amount`` at the largest force. A form of `by_step` raises the left
-        bearing's moment at the step ``at`` by the share ``amount`` over the plausible amount, the right one's by
-        ``width`` times that.
+        Where they are `UNEQUAL` that is the mean, and the left one has the share ``width`` of it more. A moment that
+        grows with the force is ``amount`` at the largest force. A form of `by_step` raises the left bearing's moment at
+        the step ``at`` by the share ``amount`` over the plausible amount, the right one's by ``width`` times that.
         """
         bending = model.bending
         if variant.label in (WITH_FORCE, BY_STEP):
@@ -93,8 +98,12 @@ class BearingFriction(Cause):
                 share = amount / self.plausible(facts) * np.array([1.0, variant.width])
                 more = np.eye(steps)[int(variant.at)][:, None] * share * (ends + before)
             return replace(model, bending=replace(bending, friction_by_step=before + more))
-        angle = variant.at or bending.left.stick_angle
-        return _at_bearings(model, variant, lambda end: replace(end, friction_moment=amount, stick_angle=angle))
+        angle, apart = variant.at or bending.left.stick_angle, variant.width if variant.label == UNEQUAL else 0.0
+        left, right = (
+            replace(end, friction_moment=part * amount, stick_angle=angle)
+            for end, part in ((bending.left, 1.0 + apart), (bending.right, 1.0 - apart))
+        )
+        return replace(model, bending=replace(bending, left=left, right=right))
 
 
 class BearingStiffness(Cause):
