@@ -3,7 +3,7 @@
 A fit whitens its rows by the noise that is likeliest beforehand. What is known less well is integrated over here:
 
     slow      slow errors of a photo and errors of its bearing axes, times 0.3, 1 or 3
-    waves     errors of each photo along the cable, rough ones as below, none or up to the scatter of a section
+    waves     errors of each photo along the cable, rough ones as below: none, faint, or as the scatter of a section
     hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean, and more of both
               as far as few samples leave the level of their noise open
     moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
@@ -59,12 +59,9 @@ samples may belie their noise is no matter of belief, see `hold_sizes`."""
 SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
 """Of the cable's length: from below what any photo shows to a bow that is another experiment."""
 
-WAVES = {False: 0.7, True: 0.3}
-"""Whether photos have waves, with probabilities beforehand: light, ground and print that no photo tells from the cable
-move its midline by a few hundredths of a pixel, a part of what single sections scatter."""
-
-FAINTEST = 0.1
-"""Of the scatter of a section: fainter waves are none."""
+WAVES = {0.0: 0.7, 0.3: 0.15, 1.0: 0.15}
+"""Waves of a photo, in what single sections scatter, with probabilities beforehand: light, ground and print that no
+photo tells from the cable move its midline by a few hundredths of a pixel, and by as much at most."""
 
 FORCES = (0.0, *np.geomspace(1e-3, 0.3, 5))
 """Of the largest force."""
@@ -106,6 +103,8 @@ class ErrorGrid:
         Of the covariance that takes away.
     kinds : tuple of Kind
         Those of noise alone come first.
+    shapes : (a,)
+        Sizes of what is in the shapes, in the cable's length: `SHAPES`, then those of `WAVES`.
     hold : mapping of size -> probability
     """
 
@@ -114,6 +113,7 @@ class ErrorGrid:
     roots: tuple[Array, ...]
     log_det: Array
     kinds: tuple[Kind, ...]
+    shapes: Array
     hold: Mapping[float, float]
 
     @property
@@ -143,7 +143,7 @@ class ErrorGrid:
                 if slow >= len(kind.shapes):
                     continue
                 a, b = kind.pairs.T
-                shape, shape_det = along(kind.shapes[slow], photo, np.zeros(1), np.array(SHAPES), own)
+                shape, shape_det = along(kind.shapes[slow], photo, np.zeros(1), self.shapes, own)
                 held, held_det = along(kind.holds, force, np.array([*self.hold]), np.array(FORCES), own)
                 tables.append((held[:, b] + shape[:, a] + by_slow).reshape(-1, fixed.size))
                 log_det.append((held_det[:, b] + shape_det[:, a] + det).ravel())
@@ -170,7 +170,7 @@ class ErrorGrid:
         slow, number, hold, shape, force = position
         kind, found = self.kinds[number], np.zeros(len(rows))
         own, held = kind.shapes[slow], kind.holds
-        in_photos = SHAPES[shape] ** 2 * own.size
+        in_photos = self.shapes[shape] ** 2 * own.size
         along = in_photos / (1.0 + in_photos) * (own.turn @ (self.roots[slow] @ rows[self.photos]))
         found[self.photos] = np.linalg.solve(self.roots[slow], own.turn.T @ along)
         in_forces = FORCES[force] ** 2 * held.size
@@ -196,19 +196,23 @@ def error_grid(observation: Observation, facts: Facts) -> ErrorGrid:
         shown = _shown(observation, facts, photos, partial(_waves, power=power))
         by_power.append(tuple(_of_photos(observation, photos, root, shown, smooth) for root in roots))
     kinds = [Kind((none,) * len(SLOW), held[1], every[:1], 1.0, noise=True)]
-    if len(faint := every[_faint(observation, facts)[every[:, 0]] & (every[:, 1] == 0)]):
-        kinds = [kinds[0]._replace(chance=WAVES[False]), Kind(by_power[1], held[1], faint, WAVES[True], noise=True)]
+    seen = [np.median(photo.sections.section_std) for photo in observation.photos]
+    waves = np.array([*WAVES][1:]) * (np.median(seen) if seen else 0.0) / facts.length
+    if seen:
+        own = np.array([(a, 0) for a in range(len(SHAPES), len(SHAPES) + len(waves))])
+        kinds = [kinds[0]._replace(chance=WAVES[0.0]), Kind(by_power[1], held[1], own, 1.0 - WAVES[0.0], noise=True)]
     kinds += [Kind(shapes, holds, every[1:], 1.0 / 3.0) for shapes, holds in zip(by_power, held, strict=True)]
     bumps = _shown(observation, facts, photos, lambda u: np.exp(-0.5 * (np.subtract.outer(u, PLACES) / WIDTH) ** 2))
-    waves = _shown(observation, facts, photos, partial(_waves, power=0))
+    single = _shown(observation, facts, photos, partial(_waves, power=0))
     axes = facts.length * _rows(observation, photos, lambda photo: by_axes(photo.sections, photo.chord))
     alone = every[(every[:, 1] == 0) & (every[:, 0] > 0)]
-    patterns = np.hstack([waves, bumps, axes]).T
+    patterns = np.hstack([single, bumps, axes]).T
     for pattern in patterns:
         spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
         kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / len(patterns)))
     log_det = np.array([np.sum(np.log(one)) for one in wide])
-    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), hold_sizes(observation))
+    shapes = np.append(SHAPES, waves)
+    return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), shapes, hold_sizes(observation))
 
 
 def hold_sizes(observation: Observation) -> dict[float, float]:
@@ -223,13 +227,6 @@ def hold_sizes(observation: Observation) -> dict[float, float]:
     found = {none: 0.5 * as_told, float(np.sqrt((1.0 + size**2) * higher - 1.0)): off}
     more = float(np.sqrt(higher - 1.0))  # none, where the level is stated
     return found | {more: found.get(more, 0.0) + 0.5 * as_told}
-
-
-def _faint(observation: Observation, facts: Facts) -> NDArray[np.bool_]:
-    """Which of `SHAPES` are waves of a photo, and nothing else."""
-    seen = [np.median(photo.sections.section_std) for photo in observation.photos]
-    scatter, size = np.median(seen) if seen else 0.0, facts.length * np.array(SHAPES)
-    return np.asarray((size >= FAINTEST * scatter) & (size <= scatter) & (size > 0.0))
 
 
 def _waves(u: Array, *, power: int) -> Array:

@@ -57,7 +57,7 @@ class Products:
     scales : (G, m + r)
         Sizes of errors of the displacements (m) and of the rig.
     sizes : (G, 5)
-        Positions of the error model: in `SLOW`, among the kinds, in `HOLD`, `SHAPES` and `FORCES`.
+        Positions of the error model: in `SLOW`, among the kinds, in `HOLD`, ``shapes`` and `FORCES`.
     """
 
     own: Array

@@ -14,7 +14,7 @@ from fixtures.hidden import LOOP, Reading, hidden_test
 from fixtures.scores import SETTINGS, error_models, exact_bench
 from fixtures.trials import random_cable
 from pipeline.diagnosis import diagnose
-from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, SHAPES, SLOW, hold_sizes
+from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, SLOW, WAVES, hold_sizes
 from pipeline.diagnosis.posterior.evidence import SIZES, as_told, evidence, evidences, moments
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
 from pipeline.diagnosis.posterior.products import MOVED
@@ -43,7 +43,7 @@ def covariance(grid, sizes):
     kind, count = grid.kinds[number], len(grid.photos) + len(grid.forces)
     whole, root = np.eye(count), np.linalg.inv(grid.roots[slow])
     own, held = kind.shapes[slow], kind.holds
-    turned = np.eye(len(grid.photos)) + (own.turn.T * SHAPES[shape] ** 2 * own.size) @ own.turn
+    turned = np.eye(len(grid.photos)) + (own.turn.T * grid.shapes[shape] ** 2 * own.size) @ own.turn
     whole[np.ix_(grid.photos, grid.photos)] = root @ turned @ root
     wide = [*grid.hold][hold] ** 2 + FORCES[force] ** 2 * held.size
     whole[np.ix_(grid.forces, grid.forces)] += (held.turn.T * wide) @ held.turn
@@ -87,7 +87,7 @@ def test_probabilities_of_error_models_sum_to_one(bench, grid):
     found = grid.products(np.ones((count, 1)), np.ones((1, 1)), *np.zeros((3, count, 0)))
     for rest in (True, False):
         assert np.exp(found.log_prior[found.rest == rest]).sum() == pytest.approx(1.0)
-    assert all(sum(chances.values()) == pytest.approx(1.0) for chances in (SLOW, HOLD, grid.hold, MOVED))
+    assert all(sum(chances.values()) == pytest.approx(1.0) for chances in (SLOW, HOLD, WAVES, grid.hold, MOVED))
 
 
 def test_a_level_told_by_few_samples_may_be_too_low():
@@ -215,9 +215,9 @@ def test_noise_is_noise(bench, grid):
         assert sum(one.probability for one in found.believed) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("size", "word"), [(0.3, "base"), (2.0, "rest")])
+@pytest.mark.parametrize(("size", "word"), [(0.3, "base"), (1.0, "base"), (2.0, "rest")])
 def test_one_shape_that_comes_and_goes_from_step_to_step(bench, grid, size, word):
-    """Fine waves of no order over the steps: noise below the scatter of a section, something else at twice that.
+    """Fine waves of no order over the steps: noise up to the scatter of a section, something else at twice that.
 
     A rate of 0.9 shows less than 6 of 10 once in a hundred.
     """
@@ -231,6 +231,14 @@ def test_one_shape_that_comes_and_goes_from_step_to_step(bench, grid, size, word
             height = size * scatter * rng.standard_normal()
             field[bench.observation.rows.of_photo(photo.step)] = photo.whiten[:, 1:] @ (height * waves)
     assert sum(found.word == word for found in believed(bench, grid, fields)) >= 6
+
+
+def test_waves_that_are_noise_go_up_to_what_sections_scatter(bench, grid):
+    """Wherever that lies among the sizes of something else, of which the next one is five times another."""
+    scatter = np.median([np.median(photo.sections.section_std) for photo in bench.observation.photos])
+    (noise,) = (kind for kind in grid.kinds if kind.noise and len(kind.shapes[0].size))
+    sizes = bench.facts.length * grid.shapes[noise.pairs[:, 0]]
+    assert sizes == pytest.approx([size * scatter for size in WAVES if size]) and max(sizes) == pytest.approx(scatter)
 
 
 def test_shares_beforehand_sum_to_one():
