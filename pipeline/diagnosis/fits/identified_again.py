@@ -59,7 +59,20 @@ def identified_again(
     found = mean_law(observation, fitted)
     covariance = mean_posterior(observation, found).covariance
     moved = moved_by_forces(observation, found, covariance, force_errors)
-    return _with_other_forms(observation, Identified(found, covariance + moved @ moved.T))
+    again = Identified(found, covariance + moved @ moved.T, _of_the_middle(found))
+    return _with_other_forms(observation, again)
+
+
+def _of_the_middle(fitted: Fit) -> Fit | None:
+    """The model with f_EI of the middle one of all places along a cable whose stiffness varies; None where it does not.
+
+    Of a cable with a soft spot the rest is wanted, and is its middle; with several forms none of its places may be the
+    one that the law is of, and which of them it is part of the band.
+    """
+    profile = fitted.run.model.bending.rod.section.profile
+    if profile is None:
+        return None
+    return replace(fitted, vector=fitted.extension.base.stiffer(fitted.vector, float(np.median(profile))))
 
 
 def _with_other_forms(observation: Observation, again: Identified) -> Identified:

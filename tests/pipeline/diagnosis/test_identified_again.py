@@ -42,6 +42,16 @@ def test_a_steep_law_is_followed(form):
     assert z < 2.0
 
 
+def test_which_place_of_a_cable_the_law_is_of_is_part_of_the_band():
+    """A taper with a splice is told by forms none of whose places need have the stiffness that the law is of."""
+    tapered = Cable(EI0=0.015, EI1=0.015, stiffness_profile=lambda u: 0.3 * u - 0.15 + profile(0.15, SPOT)(u))
+    error, _, z, _ = off(tapered, "stiffness_varying", SIX, 0.0138, seed=26)
+    assert z < 2.0 and error < 0.05
+    alone = Cable(EI0=0.015, EI1=0.015, stiffness_profile=profile(-0.2, SPOT))
+    error, band, z, _ = off(alone, "stiffness_varying", SIX, 0.0138, seed=26)
+    assert z < 2.0 and error < 0.01 and band < 0.01
+
+
 def test_a_loop_of_another_form_is_within_the_band():
     """Bouc and Wen's friction is no sum of elements; with such a sum the law is off by more than its noise."""
     cable = Cable(memory=BoucWen(4e-3, 1.2))
