@@ -36,8 +36,14 @@ def free_profile(observation: Observation, fitted: Fit, cause: Cause) -> list[Fi
     cause : Cause
         A profile along the cable.
     """
-    found = fit_from(observation, *in_waves(fitted, cause), fitted)
-    return [] if found.run.prediction is None else [found]
+    extension, vector = in_waves(fitted, cause)
+    starts, base, (at, facts) = [vector], extension.base, (extension.base.pre_curvature_index, extension.facts)
+    if at is not None and "mounted" not in facts.branch:
+        # nothing shows the cable at rest, and few forms that are far from the data leave the side of K0 to chance
+        starts.append(np.r_[base.neutral(), vector[len(base.names) :]])
+        starts[1][at] = -vector[at]
+    found = [fit_from(observation, extension, start, fitted) for start in starts]
+    return sorted((one for one in found if one.run.prediction is not None), key=lambda one: one.chi2)[:1]
 
 
 def in_waves(fitted: Fit, cause: Cause) -> tuple[Extension, Array]:

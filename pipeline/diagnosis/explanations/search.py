@@ -19,7 +19,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pipeline.diagnosis.causes.begun import BEGUN
-from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
+from pipeline.diagnosis.explanations.candidates import LEAST, candidates, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
@@ -203,11 +203,14 @@ class Search:
     def begun(self) -> None:
         """What begins between two holds, beside the base model and the likeliest causes: it is something else."""
         base, bench = explanation_of((), self.bench.base, self.bench.base), self.bench
-        for one in (base, *(found.found for found in self.posterior.explanations()[:LIKELIEST] if found.found)):
+        known = [base, *(found.found for found in self.posterior.explanations()[:LIKELIEST] if found.found)]
+        hopeless = min(one.fitted.chi2 for one in known) + LEAST
+        for one in known:
             about = suspect(bench.observation, one.fitted, BEGUN)
             loud = (about.best(number) for number in range(len(BEGUN)))
-            since = [k for k in loud if k is not None and about.statistic[k] ** 2 > SHAPE_GAIN]
-            fits = (fit_term(bench.observation, one.fitted, about, k) for k in since)
+            least = max(SHAPE_GAIN, one.fitted.chi2 - hopeless)
+            since = [k for k in loud if k is not None and about.statistic[k] ** 2 > least]
+            fits = (fit_term(bench.observation, one.fitted, about, k, hopeless=hopeless) for k in since)
             found = (explanation_of(one.causes, bench.base, fitted) for fitted in fits if fitted is not None)
             self.hypotheses += [refitted(self.grid.plain, explanation, bench.facts) for explanation in found]
 
