@@ -28,7 +28,7 @@ from pipeline.vision.search.beyond import (
     rest_faced_at,
 )
 from pipeline.vision.search.candidates import Reading, approaches_itself, branches
-from pipeline.vision.search.closeup import Closeup, take_closeup
+from pipeline.vision.search.closeup import edge_spreads, take_closeup
 from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import (
     COVER_MARGIN_WIDTHS,
@@ -143,10 +143,11 @@ def refused_at(photo: Photo, key: str, place: Sequence[float] | Array) -> Reject
 def _unsharp(photo: Photo, standout: Standout, cut: CrossCut) -> Rejected | None:
     """Say of a photo whose covers were not found that its edges are blurred, where they are."""
     width = cut.usual_width * standout.reduction
-    closeup = take_closeup(photo, standout.to_pixels(cut.path), width, cut.weights)
-    if closeup.softest_px <= _BLURRED * width:
-        return None
-    return refused(photo, "photo/blur", blur_px=closeup.softest_px, width_px=width)
+    path, across = standout.to_pixels(cut.path), path_normals(cut.path)[1]
+    closeup = take_closeup(photo, path, width, cut.weights)
+    # a shadow softens one edge, focus and motion both
+    softest = float(edge_spreads(closeup.picture[..., 0], closeup.to_cells(path), across, width).min(axis=0).max())
+    return refused(photo, "photo/blur", blur_px=softest, width_px=width) if softest > _BLURRED * width else None
 
 
 def _axes(
@@ -198,11 +199,10 @@ def _assemble(
         left=axes[0],
         right=axes[1],
         half_width_px=0.5 * width,
-        grey=closeup.grey,
-        origin_px=closeup.origin_px,
+        grey=closeup.picture[..., 0],
+        origin_px=closeup.offset_px,
         dark=cut.dark,
         contrast=cut.contrast,
-        blur_px=closeup.blur_px,
         weights=tuple(float(weight) for weight in cut.weights),
         grid_px=photo.grid_px,
         findings=tuple(_hidden_end(axis, cable) for axis in axes if axis.kind == "clamp"),
@@ -211,7 +211,7 @@ def _assemble(
 
 def _settled(
     photo: Photo, path: Array, axes: tuple[Bearing, Bearing], weights: Array, width: float
-) -> tuple[Closeup, tuple[Bearing, Bearing], Array]:
+) -> tuple[Standout, tuple[Bearing, Bearing], Array]:
     """The strip from close by, its axes with the left one first, and its path (n, 2) px between them."""
     if not left_first(np.array(axes[0].center_px), np.array(axes[1].center_px)):
         path, axes = path[::-1], axes[::-1]

@@ -72,8 +72,6 @@ class RoughCable:
         True if the cable is darker than the ground in ``grey``.
     contrast : grey
         Median step between ground and cable, positive.
-    blur_px : px
-        Standard deviation of the edge spread, estimated on the window's edges along the cable.
     weights : tuple of float
         Colour projection: weight of each channel as stored (one for grey photos).
     grid_px : float
@@ -97,7 +95,6 @@ class RoughCable:
     origin_px: tuple[int, int]
     dark: bool
     contrast: float
-    blur_px: float
     weights: tuple[float, ...] = (1.0,)
     grid_px: float = 1.0
     findings: tuple[Finding, ...] = ()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from pipeline.messages import Message
 from pipeline.records import Array, Rejected
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
-from pipeline.vision.centerline.edges import SEARCH_RADII, Ground, in_picture, search_edges
+from pipeline.vision.centerline.edges import SEARCH_RADII, Ground, in_picture, normals, search_edges
 from pipeline.vision.centerline.midline import (
     EDGE_WINDOW_BLURS,
     LEAST_SECTIONS,
@@ -22,7 +21,8 @@ from pipeline.vision.centerline.midline import (
 )
 from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.rough import Bearing, RoughCable
+from pipeline.vision.rough import RoughCable
+from pipeline.vision.search.closeup import edge_spreads
 
 _BLOCK = 1.5  # half widths before what hides a cable up to a given axis: its border may lie aslant by 45 degrees or so
 _WIDTH_TOLERANCE = 0.15  # relative; prior of the width in the search when the diameter is known, else twice that
@@ -106,7 +106,7 @@ def fit_along(
     return fit(None, 8)
 
 
-def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | Rejected:
+def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | None = None) -> Sections | Rejected:
     """Sections of the cable, laid on a path in px that follows its midline.
 
     Parameters
@@ -115,6 +115,8 @@ def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | R
         Expected half width of the cable.
     known : bool
         True if it is that of the diameter, False if it is that of the mask.
+    blur : px
+        Standard deviation of the edges' spread; measured if not given.
     """
     ground = Ground(rough.grey if rough.dark else -rough.grey, rough.origin_px)
     first, last = rough.visible
@@ -126,7 +128,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | R
     intervals = int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER)
-    covers = tuple(_cover(bearing, rough.blur_px) for bearing in (rough.left, rough.right) if bearing.radius_px)
+    covers = _covers(rough, blur or 0.0)
     margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in (rough.left, rough.right)]
     span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width)
     if span is None:
@@ -140,25 +142,28 @@ def follow(rough: RoughCable, *, half_width: float, known: bool) -> Sections | R
         return _lost(rough, float(np.mean(usable)))
     diameter, half_width = 2.0 * half_width, 0.5 * middle
     where, angle = path.at(found.s)
-    points = where + found.edges.mean(axis=1)[:, None] * np.column_stack([-np.sin(angle), np.cos(angle)])
+    points = where + found.edges.mean(axis=1)[:, None] * normals(angle)
     path = follow_points(points[usable], start=path, s=found.s[usable], order=_PENALTY_ORDER)
+    if blur is None:
+        where, angle = path.at(found.s)
+        blur = median(edge_spreads(rough.grey, where - ground.origin_px, normals(angle), middle))
+    covers = _covers(rough, blur)
     count = round((span[1] - span[0]) / (_SECTION_SPACING_DIAMETERS * diameter))
     count = min(max(count, _MIN_SECTIONS), _MAX_SECTIONS, int(span[1] - span[0]))
     s = span[0] + (np.arange(count) + 0.5) * (span[1] - span[0]) / count
     s = s[
         free_of_covers(path, s, _COVER_CHECK_RADII * half_width, covers)
-        & in_picture(ground, path, s, 1.2 * half_width + 3.0 * rough.blur_px + 4.0)
+        & in_picture(ground, path, s, 1.2 * half_width + 3.0 * blur + 4.0)
     ]
     if len(s) < LEAST_SECTIONS:
         return _lost(rough, 0.0)
-    sections = measure_sections(
-        ground, path, s, half_width=half_width, diameter=diameter if known else None, blur=rough.blur_px
-    )
+    stated = diameter if known else None
+    sections = measure_sections(ground, path, s, half_width=half_width, diameter=stated, blur=blur)
     if sections is None:
         return _lost(rough, 0.0)
     softest = min(sections.softest, half_width / EDGE_WINDOW_BLURS)  # from there on one edge's window holds the other
-    if softest > _SOFTER * rough.blur_px:
-        return follow(replace(rough, blur_px=softest), half_width=0.5 * diameter, known=known)
+    if softest > _SOFTER * blur:
+        return follow(rough, half_width=0.5 * diameter, known=known, blur=softest)
     return sections
 
 
@@ -198,10 +203,13 @@ def _lead(start: float, axis: Array, seam: float, s: Array, points: Array) -> Ca
     return at
 
 
-def _cover(bearing: Bearing, blur: float) -> Cover:
-    # Twice the blur and the errors of the circle, so that no pixel of the cover's edge reaches a section.
-    margin = 2.0 * blur + 3.0 * bearing.std_px + 3.0 * (bearing.radius_std_px or 0.0) + 1.0
-    return Cover(bearing.center_px, float(bearing.radius_px or 0.0) + margin)
+def _covers(rough: RoughCable, blur: float) -> tuple[Cover, ...]:
+    """Discs that hide the cable, larger by twice the blur and the errors of the circle: none of their edge is read."""
+    return tuple(
+        Cover(b.center_px, b.radius_px + 2.0 * blur + 3.0 * b.std_px + 3.0 * (b.radius_std_px or 0.0) + 1.0)
+        for b in (rough.left, rough.right)
+        if b.radius_px
+    )
 
 
 def _span(

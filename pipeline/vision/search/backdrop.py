@@ -65,6 +65,11 @@ class Standout:
     covariance: Array
     picture: Image
 
+    @classmethod
+    def of_grey(cls, grey: Image, origin_px: tuple[int, int]) -> Standout:
+        """A grey window ``(h, w)`` at full resolution, taken as it is."""
+        return cls(1, origin_px, grey[..., None], np.eye(1), grey[..., None])
+
     @cached_property
     def distance(self) -> Image:
         """Picture ``(h, w)``: colour distance from the ground in standard deviations of the ground."""

@@ -7,44 +7,21 @@ Units: px and fractions of full range.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.vision.median import median
+from pipeline.vision.median import medians
 from pipeline.vision.photo import Photo, sampled
-from pipeline.vision.search.crosscut import path_normals
+from pipeline.vision.search.backdrop import Image, Standout
 
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
 _TILE = 128  # px; pieces of the window that are projected or left out
 _CORRIDOR_WIDTHS = 2.25  # widths; half corridor kept at full resolution: noise is read up to 1.6 widths away
 
 
-@dataclass(frozen=True)
-class Closeup:
-    """Grey window along the cable and what its pixels are worth.
-
-    Attributes
-    ----------
-    grey : (h, w) float32
-        Zero outside the corridor.
-    origin_px : (u, v)
-        Photo pixel of ``grey[0, 0]``.
-    blur_px, softest_px : px
-        Standard deviation of the edge spread: the median, and where it is most, of the sharper edge there.
-    """
-
-    grey: NDArray[np.float32]
-    origin_px: tuple[int, int]
-    blur_px: float
-    softest_px: float
-
-
-def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) -> Closeup:
-    """Project the corridor along ``path_px`` (k, 2) to grey and measure its blur."""
+def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) -> Standout:
+    """The window along ``path_px`` (k, 2) at full resolution, its corridor projected to grey."""
     margin = _CORRIDOR_WIDTHS * width_px + 8.0
     low = np.maximum(np.floor(path_px.min(axis=0) - margin).astype(int), 0)
     high = np.minimum(np.ceil(path_px.max(axis=0) + margin).astype(int) + 1, photo.size)
@@ -57,8 +34,7 @@ def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) 
             np.multiply(part, scaled[0], out=grey[rows, columns])
         else:
             cv2.transform(part.astype(np.float32), scaled[None, :], grey[rows, columns])
-    spreads = _edge_spreads(grey, path_px - low, width_px)
-    return Closeup(grey, (int(low[0]), int(low[1])), median(spreads), float(spreads.min(axis=0).max()))
+    return Standout.of_grey(grey, (int(low[0]), int(low[1])))
 
 
 def _stretches(path: Array, margin: float, size: tuple[int, int]) -> list[tuple[slice, slice]]:
@@ -76,58 +52,29 @@ def _stretches(path: Array, margin: float, size: tuple[int, int]) -> list[tuple[
     ]
 
 
-def _edge_spreads(grey: NDArray[np.float32], path: Array, width: float) -> Array:
-    """Edge spread ``(2, k)`` of both sides on groups of neighbouring sections, 0 without an edge.
+def edge_spreads(grey: Image, middle: Array, across: Array, width: float) -> Array:
+    """Standard deviation ``(2, k)`` px of the spread of both edges on groups of neighbouring sections, 0 without one.
 
-    A blurred step of height A has the slope ``A / (sqrt(2 pi) sigma)`` in its middle.
+    A blurred step of height A has the slope ``A / (sqrt(2 pi) sigma)`` in its middle. The median of a group passes over
+    letters, whose rims are no edges of the cable.
+
+    Parameters
+    ----------
+    grey : (h, w)
+    middle, across : (n, 2) px, -
+        Places on ``grey`` along the middle of the cable, and unit vectors across it.
+    width : px
+        Of the cable.
     """
-    _, normal = path_normals(path)
-    sections = np.linspace(0.1, 0.9, 8 * _GROUPS) * (len(path) - 1)
-    centre = np.column_stack([np.interp(sections, np.arange(len(path)), column) for column in path.T])
-    across = normal[np.rint(sections).astype(int)]
-    offsets = np.arange(-0.4 * width, 0.4 * width + 0.25, 0.25)
-    spreads = []
-    for side in (-0.5, 0.5):
-        profile = sampled(grey, centre[:, None] + across[:, None] * (side * width + offsets)[:, None])
-        spreads.append(_spread_of_groups(profile, offsets, outward=side > 0.0))
-    return np.array(spreads)
-
-
-def _spread_of_groups(profile: NDArray[np.float32], offsets: Array, *, outward: bool) -> Array:
-    """Spread of one edge on each group of sections; 0 where the profile is flat. ``outward``: sheath first."""
-    spacing = float(offsets[1] - offsets[0])
+    step = 0.25
+    offsets = np.arange(-0.4 * width, 0.4 * width + step, step)
     plateau = max(2, len(offsets) // 6)
-    ends = np.stack([profile[:, :plateau].mean(axis=1), profile[:, -plateau:].mean(axis=1)])
-    step, level = ends[1] - ends[0], 0.5 * (ends[0] + ends[1])
-    above = (profile - level[:, None]) * np.sign(step)[:, None] > 0
-    crossing = np.argmax(above, axis=1)
-    # Lined up at their own crossings, so a path half a pixel off does not count as blur: each is moved by whole columns
-    # and all by the same fraction of one.
-    columns = np.arange(len(offsets)) + crossing[:, None] + float(offsets[0]) / spacing
-    low = np.floor(columns).astype(int)
-    share = (columns - low).astype(np.float32)
-    last = len(offsets) - 1
-    first, second = (np.take_along_axis(profile, np.clip(low + k, 0, last), axis=1) for k in (0, 1))
-    kept = _without_print(ends[::-1] if outward else ends)
-    lined = np.average(
-        (first + share * (second - first)).reshape(_GROUPS, -1, len(offsets)),
-        axis=1,
-        weights=np.broadcast_to(kept[..., None], (*kept.shape, len(offsets))),
-    )
-    rise = np.abs(lined[:, 2:] - lined[:, :-2])[:, plateau - 1 : 1 - plateau]
-    slope = rise.max(axis=1, initial=0.0) / (2.0 * spacing)
-    height = np.abs(np.average(step.reshape(_GROUPS, -1), axis=1, weights=kept))
-    return np.asarray(np.where(slope > 0.0, height / (np.sqrt(2.0 * np.pi) * np.maximum(slope, 1e-12)), 0.0))
-
-
-def _without_print(ends: NDArray[np.float32]) -> Array:
-    """Weights ``(groups, sections)``: 0 where the sheath differs from that of the group; ground and sheath ``(2, n)``.
-
-    Letters cover less than half of the sections. Their rims are no edges of the cable, and where the ink is brighter
-    than a bright sheath, half of its height is reached at the rim and not at the cable's edge.
-    """
-    grouped = ends.reshape(2, _GROUPS, -1)
-    usual = np.median(grouped, axis=2, keepdims=True)
-    # A quarter of the step: texture and light vary by less, fainter ink does not reach half of the height.
-    plain = np.abs(grouped[1] - usual[1]) < 0.25 * np.abs(usual[1] - usual[0])
-    return np.where(plain.any(axis=1, keepdims=True), plain, True).astype(float)
+    spreads = np.zeros((2, _GROUPS))
+    for side, edge in enumerate((-0.5 * width, 0.5 * width)):
+        profiles = sampled(grey, middle[:, None] + (edge + offsets)[:, None] * across[:, None])
+        for k, group in enumerate(np.array_split(profiles, _GROUPS)):
+            profile = medians(group, axis=0)
+            height = abs(float(profile[-plateau:].mean() - profile[:plateau].mean()))
+            slope = float(np.abs(profile[2:] - profile[:-2])[plateau - 1 : 1 - plateau].max(initial=0.0)) / (2.0 * step)
+            spreads[side, k] = height / (np.sqrt(2.0 * np.pi) * slope) if slope > 0.0 else 0.0
+    return spreads

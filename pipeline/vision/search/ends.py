@@ -22,7 +22,6 @@ from pipeline.vision.polyline import arc_lengths, step_lengths
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
-from pipeline.vision.search.closeup import Closeup
 from pipeline.vision.search.strips import end_direction
 
 COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges so far beyond its circle
@@ -98,7 +97,7 @@ def _to_circle(start: Array, direction: Array, center: Array, radius: float) -> 
     return along - float(np.sqrt(max(radius**2 - aside**2, 0.0)))
 
 
-def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tuple[Bearing, Array]:
+def settle_end(axis: Bearing, path: Array, closeup: Standout, width: float) -> tuple[Bearing, Array]:
     """Put an axis that is a visible end where the refined path ends; a free end to a fraction of a pixel.
 
     The last sections of a path feel the end and are replaced by a parabola that continues the path.
@@ -109,7 +108,8 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tu
         Returned as it is unless its kind is ``end`` or ``clamp``.
     path : (k, 2) px
         Refined path; its last point is the end.
-    closeup : Closeup
+    closeup : Standout
+        At full resolution.
     width : px
     """
     if axis.kind not in ("end", "clamp"):
@@ -123,8 +123,8 @@ def settle_end(axis: Bearing, path: Array, closeup: Closeup, width: float) -> tu
     across = np.array([-outward[1], outward[0]])
     along = np.arange(-1.5 * width, 1.5 * width + 0.125, 0.25)
     rows = np.linspace(-0.25, 0.25, 9) * width
-    points = path[-1] - closeup.origin_px + along[None, :, None] * outward + rows[:, None, None] * across
-    profiles = sampled(closeup.grey, points)
+    points = closeup.to_cells(path[-1]) + along[None, :, None] * outward + rows[:, None, None] * across
+    profiles = sampled(closeup.picture[..., 0], points)
     places = [_half_level(profile, along, width) for profile in profiles]
     known = np.array([(row, place) for row, place in zip(rows, places, strict=True) if place is not None])
     if len(known) < 5:

@@ -125,7 +125,6 @@ def rough_cable(
         origin_px=(0, 0),
         dark=dark,
         contrast=0.6,
-        blur_px=scene.sensor.blur_px,
     )
 
 

@@ -84,11 +84,10 @@ def measured_on_second_renderer(seed: int, *, bright: bool = False, stated_m: fl
         left=Bearing(picture.left_px, 0.03, COVER * scale, 0.1),
         right=Bearing(picture.right_px, 0.03, COVER * scale, 0.1),
         half_width_px=1.05 * look.radius,
-        grey=closeup.grey,
-        origin_px=closeup.origin_px,
+        grey=closeup.picture[..., 0],
+        origin_px=closeup.offset_px,
         dark=not bright,
         contrast=0.5,
-        blur_px=closeup.blur_px,
     )
     found = measure_centerline(rough, plane=PlaneMap.from_scale(scale), diameter_m=stated_m, settings=VisionSettings())
     assert isinstance(found, Centerline), found
