@@ -38,7 +38,6 @@ _BEYOND_OBJECT_CONTRAST = 0.8
 out less may be shadows.
 """
 _BEYOND_DARKEST = 0.02  # of full range; a ground darker than that is counted as so bright: it tells no share
-_FADING_SHARE = 0.5  # of the step before an end that is left beyond it: covers leave less, glare more
 _SHEET_WIDTHS = 60.0  # widths; a sheet of paper across a cable hides no more of it: 300 mm of 5 mm
 _SHEET_TURN_DEG = 60.0  # degrees against the chord; a cable turns by twice that at most under a sheet
 _BEYOND_WIDTH_OFF = 0.15  # relative; a cable's width is constant within 5 %, where a line crosses it edges are lost
@@ -51,31 +50,6 @@ _WHOLE_SHARE = 0.97  # of the known length; a strip so long with free ends is th
 
 Axes = tuple[Bearing, Bearing]
 Place = tuple[float, float]
-
-
-def fades(standout: Standout, cut: CrossCut, width: float, *, at_start: bool) -> bool:
-    """True if a strip goes on beyond its end hardly fainter than before: glare takes its contrast, it does not end.
-
-    Parameters
-    ----------
-    standout : Standout
-    cut : CrossCut
-        The strip's cross-cuts.
-    width : cells
-        Of the strip.
-    at_start : bool
-        The first point, else the last.
-    """
-    path, step = (cut.path[::-1], cut.step[::-1]) if at_start else (cut.path, cut.step)
-    near = slice(round(0.75 * width), round(LEAST_MORE_WIDTHS * width))
-    before = median(step[::-1][near])
-    _, ahead = _led_into_picture(standout, path, width, _BEYOND_LEADS_WIDTHS[0])
-    if len(ahead) < near.stop or before <= 0.0:
-        return False
-    more = cut_across(standout, ahead[: near.stop + round(width)], width, known=True, weights=cut.weights)
-    same = np.abs(more.width[near] / width - 1.0) < _BEYOND_WIDTH_OFF
-    faint = median(more.step[near]) > _FADING_SHARE * before
-    return more.dark == cut.dark and faint and float(np.mean(same)) > 0.5
 
 
 def rest_ahead(standout: Standout, cut: CrossCut, others: list[Strip], *, at_start: bool) -> float | None:
@@ -212,13 +186,11 @@ def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
 
 
 def goes_on_at(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None:
-    """A visible end beyond which there is more of the same close by, or at which the cable only fades."""
+    """A visible end beyond which there is more of the same close by."""
     width = cut.usual_width
     for axis, at_start in zip(axes, (True, False), strict=True):
         path = cut.path[::-1] if at_start else cut.path
         if axis.kind in ("end", "clamp") and _ahead(standout, cut, path, width) is not None:
-            return axis.center_px
-        if axis.kind == "end" and fades(standout, cut, width, at_start=at_start):
             return axis.center_px
     return None
 

@@ -31,12 +31,6 @@ JOINT_ANGLE_DEG = 30.0  # degrees; over five widths a cable turns by less unless
 _LARGE_DISC = 31  # cells; an opening by a disc takes longer than two distance transforms from here on
 _CLOSING_WIDTHS = 0.45  # widths; gaps closed in the mask: a highlight takes up to a third of the width
 _OPENING_WIDTHS = 0.3  # widths; specks removed: texture is finer than the cable
-_COVER_HOLE_WIDTHS = (0.5, 3.2)
-"""Widths; radii of holes that the rims of covers leave: covers are 2 to 6 diameters wide."""
-_RING_ROUNDNESS = 0.85  # share of its smallest circle that a hole fills; a disc in cells 0.93 and more, a square 0.64
-_RING_WALL_WIDTHS = 0.6  # widths; how thick the rim of a cover may be: loops of cable are one width thick
-_RING_FREE_SHARE = 0.6
-"""Of the directions in which the ring is thinner: the cable takes a tenth, a shadow a third of them."""
 _MAX_PIECES = 12  # largest pieces of a mask that are traced; the cable is among them
 _MAX_WIDTH_GUESSES = 3  # widths tried where the diameter is unknown; 1 was right so far
 
@@ -66,39 +60,17 @@ class Strip:
 
 
 def strip_mask(above: NDArray[np.bool_], width: float) -> Mask:
-    """Mask of what stands out, closed over highlights and filled where writing and covers' rims leave holes."""
+    """Mask of what stands out, closed over highlights and filled where writing leaves holes."""
     mask = _morphology(above.astype(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSING_WIDTHS * width))
     contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     small = [
         contour
         for contour, (_, _, _, parent) in zip(contours, tree[0] if tree is not None else (), strict=True)
-        if parent >= 0 and (cv2.contourArea(contour) < width**2 or _in_ring(contour, mask, width))
+        if parent >= 0 and cv2.contourArea(contour) < width**2
     ]
     cv2.drawContours(mask, small, -1, 1, cv2.FILLED)
     # Specks of noise and texture are thinner than any cable.
     return _morphology(mask, cv2.MORPH_OPEN, _disc(_OPENING_WIDTHS * width))
-
-
-def _in_ring(contour: cv2.typing.MatLike, mask: Mask, width: float) -> bool:
-    """True for the hole of a ring that is as large as a cover and thinner than the cable: the rim of a cover.
-
-    A cable that runs into it would make a loop of it, as if it crossed itself; a loop of cable is as thick as that.
-    """
-    center, radius = cv2.minEnclosingCircle(contour)
-    low, high = _COVER_HOLE_WIDTHS
-    if not low * width <= radius <= high * width:
-        return False
-    if cv2.contourArea(contour) < _RING_ROUNDNESS * np.pi * radius**2:
-        return False
-    angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
-    beyond = np.asarray(center)[:, None] + (radius + _RING_WALL_WIDTHS * width) * np.stack(
-        [np.cos(angle), np.sin(angle)]
-    )
-    u, v = np.rint(beyond).astype(int)
-    inside = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
-    free = np.ones(len(angle), dtype=bool)
-    free[inside] = mask[v[inside], u[inside]] == 0
-    return bool(np.mean(free) >= _RING_FREE_SHARE)
 
 
 def thick_part(mask: Mask, least: float) -> Mask:

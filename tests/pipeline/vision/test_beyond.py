@@ -12,9 +12,6 @@ from pipeline.vision import judgement
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.search.backdrop import stand_out
-from pipeline.vision.search.beyond import fades
-from pipeline.vision.search.crosscut import cut_across
 from pipeline.vision.segmentation import find_cable
 
 WIDTH, SIZE = 16, (560, 1000)
@@ -114,31 +111,8 @@ def test_a_band_across_the_cable_does_not_pass_for_it(grey, width):
     assert _is_told(found) or found.length_px == pytest.approx(_length(), rel=WHOLE)
 
 
-@pytest.mark.parametrize("bright", [120.0, 150.0])
-def test_glare_that_takes_the_contrast_makes_no_end(bright):
-    def across(picture):
-        u, v = np.arange(SIZE[1]) - 860.0, np.arange(SIZE[0])[:, None] - 380.0
-        return np.minimum(picture + bright / (1.0 + np.exp((np.hypot(u, v) - 110.0) / 25.0)), 255.0)
-
-    found = find_cable(_photo(across))
-    assert _is_told(found) or found.length_px == pytest.approx(_length(), rel=WHOLE)
-
-
-@pytest.mark.parametrize(("left", "fading"), [(0.0, False), (0.4, False), (0.6, True), (0.8, True)])
-def test_a_cable_that_fades_does_not_end(left, fading):
-    """A strip that ends where glare leaves a part of the cable's contrast: told, until too little is left."""
-
-    def across(picture):
-        return picture + (215.0 - picture) * (1.0 - left) / (1.0 + np.exp((700.0 - np.arange(SIZE[1])) / 2.0))
-
-    standout = stand_out(_photo(across), 2)
-    path = standout.to_cells(_bow()[_bow()[:, 0] < 697.0])
-    cut = cut_across(standout, path, 0.5 * WIDTH, known=True)
-    assert fades(standout, cut, 0.5 * WIDTH, at_start=False) == fading
-
-
-@pytest.mark.parametrize("slender", [10.0, 0.1])
 @pytest.mark.shared
+@pytest.mark.parametrize("slender", [10.0, 0.1])
 def test_a_fold_of_the_cloth_is_no_cable(slender, shared_data, monkeypatch):
     """Eight times as long as wide, five times the noise; its end, put where its grey falls, is the picture's border."""
     whole = load_photo(shared_data / "real" / "loop" / "white0.jpg", VisionSettings().photo)
