@@ -7,11 +7,7 @@ radius must serve both ends of several photos, all round: then it is what the us
 ``bearing_marker_mm``, and each photo is searched again with it. At one end at least the cable must be lost so near that
 the circle is no dot or screw, which lies farther ahead.
 
-A cover with a raised edge, a bevel or a groove shows several circles about one axis; its rim is the largest under which
-the cable vanishes. Across a disc below it the cable is seen to run on.
-
-The rim of a cover of the ground's own grey shows in parts only. There the dot or screw on its axis tells the same: seen
-all round, and everywhere at one distance ahead of where the cable vanishes, which is the radius.
+A cover with a raised edge, a bevel or a groove shows several circles about one axis; its rim is the largest.
 Units: px.
 """
 
@@ -26,8 +22,7 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.vision.bearings.covers import find_rim
 from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, SURE_RIM, Circle, Radius
-from pipeline.vision.bearings.rings import MARK_CELLS, find_marks
-from pipeline.vision.median import median, medians
+from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.ends import CableEnd
@@ -37,11 +32,6 @@ _COVER_RADII_WIDTHS = (0.62, 3.2)
 """Widths of the cable; range of radii searched where no size is given: covers of 1.4 to 6 diameters, and the mask may
 be a tenth wider or narrower than the cable; a smaller one shows too little of its rim.
 """
-_MARK_WIDTHS = 0.8
-"""Widths of the cable; largest radius of a dot or screw that marks an axis where no size is given: half a cover of the
-usual size.
-"""
-_MARK_ASIDE = 0.3  # of the distance ahead of the cable's end; how far aside of its direction the axis lies
 _ON_RIM = 1.4  # radii from where a cable is lost to the centre of its cover: led straight on by a width at most
 _LOST_BEFORE_RIM = 1.9
 """The same at one end, where others lie farther; letters up to the rim hide 0.9 of it, a dot of half the cover's size
@@ -66,8 +56,7 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]]) -> float | None:
     ends = [_LostEnd(photo, end, 2.0 * cable.half_width_px) for photo, cable in seen for end in visible_ends(cable)]
     if not ends:
         return None
-    to_marks = (_to_mark(end) for end in ends)
-    return _largest(ends, _ON_RIM, _ON_RIM) or _alike(to_marks) or _largest(ends, _LOST_CABLE_REACH, _LOST_BEFORE_RIM)
+    return _largest(ends, _ON_RIM, _ON_RIM) or _largest(ends, _LOST_CABLE_REACH, _LOST_BEFORE_RIM)
 
 
 def _largest(ends: list[_LostEnd], most: float, nearest: float) -> float | None:
@@ -80,39 +69,12 @@ def _largest(ends: list[_LostEnd], most: float, nearest: float) -> float | None:
         found: list[Circle] = []
         for end in ends:
             circle = end.as_large(first.radius) if found else first
-            if circle is None or not end.lost_under(circle, most):
+            if circle is None or end.ahead(circle) > most:
                 break
             found.append(circle)
         if len(found) == len(ends) and min(map(_LostEnd.ahead, ends, found)) <= nearest:
             return median([circle.radius for circle in found])
     return None
-
-
-def _alike(values: Iterable[float | None]) -> float | None:
-    """Middle of all values, if each is known and they are the same within what covers of one rig differ; else None."""
-    known: list[float] = []
-    for value in values:
-        if value is None:
-            return None
-        known.append(value)
-    return median(known) if np.ptp(known) <= SAME_RADIUS * np.mean(known) else None
-
-
-def _to_mark(lost: _LostEnd) -> float | None:
-    """Distance (px) from the cable's end to what is turned about an axis ahead of it, as far ahead as covers reach."""
-    photo, end, width = lost.photo, lost.end, lost.width_px
-    reach = _MARK_WIDTHS * width
-    step = reach / MARK_CELLS
-    ahead = np.arange(_COVER_RADII_WIDTHS[0] * width, _COVER_RADII_WIDTHS[1] * width, step)
-    most = _MARK_ASIDE * ahead[-1]
-    aside = np.arange(-most, most + step, step)
-    along, across = (grid.ravel() for grid in np.meshgrid(ahead, aside))
-    near = np.abs(across) <= _MARK_ASIDE * along
-    normal = np.array([-end.outward[1], end.outward[0]])
-    places = end.place + along[near, None] * end.outward + across[near, None] * normal
-    inside = (places >= reach).all(axis=1) & (places < np.array(photo.size) - reach).all(axis=1)
-    marks = find_marks(photo, places[inside], reach) if inside.any() else []
-    return float(np.hypot(*(np.array(marks[0].center) - end.place))) if marks else None
 
 
 def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
@@ -159,36 +121,3 @@ class _LostEnd:
         # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
         steps = int(np.ceil(np.log(high / low) / np.log(1.0 + SEARCH_RADII)))
         return np.asarray(np.geomspace(low, high, steps + 1) * self.width_px, np.float64)
-
-    def lost_under(self, circle: Circle, most: float) -> bool:
-        """True of a circle before which the cable is lost, ``most`` radii from its centre, or within it unseen."""
-        ahead = self.ahead(circle)
-        return ahead <= most and (ahead > 1.0 - SAME_RADIUS or _hides(self, circle))
-
-
-def _hides(lost: _LostEnd, outer: Circle) -> bool:
-    """True if between the end of a cable and a circle about it that looks as all round there does, not as outside."""
-    inner = lost.ahead(outer)
-    way = lost.end.place - np.array(outer.center)
-    toward = np.arctan2(way[1], way[0])
-    half = 0.25 * lost.width_px / outer.radius  # the middle half of the cable: what is beside it is ground
-    along = np.linspace(-half, half, 9)
-    between = outer.radius * (inner + np.array([0.35, 0.5, 0.65]) * (1.0 - inner))
-    beyond = outer.radius + np.array([0.3, 0.5, 0.7]) * lost.width_px
-    # Beside the cable by its whole width and more, where it hides nothing either; light from one side differs less.
-    beside = np.linspace(4.0 * half, 4.0 * half + np.pi / 3.0, 30)
-    ring = _colour(lost.photo, outer.center, between, toward + np.concatenate([-beside, beside]))
-    here = _colour(lost.photo, outer.center, between, toward + along)
-    cable = _colour(lost.photo, outer.center, beyond, toward + along)
-    return bool(np.linalg.norm(here - ring) <= np.linalg.norm(here - cable))
-
-
-def _colour(photo: Photo, center: tuple[float, float], radii: Array, angles: Array) -> Array:
-    """Median colour ``(c,)`` on pieces of circles, as far as they lie in the picture."""
-    u, v = (
-        np.rint(at + np.multiply.outer(radii, turn(angles))).astype(int).ravel()
-        for at, turn in zip(center, (np.cos, np.sin), strict=True)
-    )
-    inside = (u >= 0) & (v >= 0) & (u < photo.size[0]) & (v < photo.size[1])
-    values = photo.pixels[v[inside], u[inside]].reshape(np.count_nonzero(inside), -1)
-    return np.asarray(medians(values, axis=0) if len(values) else np.zeros(photo.channels), float)
