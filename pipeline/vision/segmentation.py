@@ -285,7 +285,7 @@ def _wanted(standout: Standout, cable: Cable) -> Wanted:
     else:
         length = cable.length_px / standout.reduction
         least, most = _VISIBLE_SHARE * length, _MAX_LENGTH_RATIO * length
-    return Wanted(width, least, most, across_objects=cable.bearings.cover_radius(1.0) is None)
+    return Wanted(width, least, most)
 
 
 def _blank(photo: Photo) -> Rejected | None:

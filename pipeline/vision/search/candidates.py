@@ -70,7 +70,6 @@ class Wanted:
     width: float | None
     least_length: float
     most_length: float = np.inf
-    across_objects: bool = True  # False where covers interrupt the cable: beyond a cover it is not the cable any more
 
 
 def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ...]]:
@@ -179,8 +178,7 @@ def _read(above: NDArray[np.bool_], width: float, level: float, wanted: Wanted) 
     mask = strip_mask(above, width)
     thick = thick_part(mask, THICK_WIDTHS * width)
     strips = [s for s in find_strips(mask, thick, width) if s.length <= wanted.most_length]
-    obstacle = None if wanted.across_objects else thick
-    joined = join_strips(strips, width, gap=_JOINT_GAP_WIDTHS * width, obstacle=obstacle)
+    joined = join_strips(strips, width, gap=_JOINT_GAP_WIDTHS * width)
     strips = [strip for strip in joined if strip.length <= wanted.most_length] or strips
     if wanted.width is None and strips:
         width = strips[0].width

@@ -123,11 +123,11 @@ def ridge_widths(mask: Mask) -> list[tuple[float, float]]:
     return [(float(np.sqrt(edges[i] * edges[i + 1])), float(pooled[i])) for i in best]
 
 
-def join_strips(strips: list[Strip], width: float, *, gap: float, obstacle: Mask | None = None) -> list[Strip]:
-    """Join strips whose ends face each other across a gap (glare, a sticker) up to ``gap``, but not an obstacle."""
+def join_strips(strips: list[Strip], width: float, *, gap: float) -> list[Strip]:
+    """Join strips whose ends face each other across a gap (glare, a sticker) up to ``gap``."""
     strips = list(strips)
     while True:
-        best = _best_joint(strips, width, gap, obstacle)
+        best = _best_joint(strips, width, gap)
         if best is None:
             return sorted(strips, key=lambda strip: -strip.length)
         i, j, first, second = best
@@ -147,25 +147,16 @@ def _bridge(start: Array, stop: Array) -> Array:
     return np.linspace(start, stop, count)[1:-1]
 
 
-def _best_joint(
-    strips: list[Strip], width: float, least: float, obstacle: Mask | None
-) -> tuple[int, int, Array, Array] | None:
+def _best_joint(strips: list[Strip], width: float, least: float) -> tuple[int, int, Array, Array] | None:
     best = None
     for i, a in enumerate(strips):
         for j in range(i + 1, len(strips)):
             for first in (a.path, a.path[::-1]):
                 for second in (strips[j].path, strips[j].path[::-1]):
                     gap = float(np.hypot(*(second[0] - first[-1])))
-                    if gap >= least or (obstacle is not None and _blocked(first[-1], second[0], obstacle)):
-                        continue
-                    if arc_joins(first, second, width, JOINT_ANGLE_DEG):
+                    if gap < least and arc_joins(first, second, width, JOINT_ANGLE_DEG):
                         best, least = (i, j, first, second), gap
     return best
-
-
-def _blocked(start: Array, stop: Array, obstacle: Mask) -> bool:
-    u, v = np.rint(np.linspace(start, stop, 50)).astype(int).T
-    return bool(obstacle[v, u].any())
 
 
 def arc_joins(first: Array, second: Array, width: float, most_deg: float) -> bool:
