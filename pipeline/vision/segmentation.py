@@ -196,7 +196,7 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     likely = [found for reading in judged for found in reading.outcomes if isinstance(found, RoughCable)]
     # a shadow that lies apart from the cable is as long and fainter
     strongest = max((found.contrast for found in likely), default=0.0)
-    likely = [found for found in likely if found.contrast >= _RIVAL_SHARE * strongest]
+    likely = [found for found in likely if found.contrast >= min(_RIVAL_SHARE * strongest, strongest)]
     likely.sort(key=lambda found: -found.evidence.value)
     refusals = [
         (area, outcome, path)

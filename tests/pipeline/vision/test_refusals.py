@@ -262,13 +262,27 @@ def test_path_beside_the_cable_is_refused(seed):
     assert found.said.values["measured_share"] == 0.0
 
 
-@pytest.mark.parametrize("ground", [Ground("plain", (0.85,) * 3), Ground(cloth, (0.8,) * 3, 0.03)])
-def test_shades_of_a_white_cable_on_white_are_no_edges(ground, tmp_path):
-    rng = np.random.default_rng([96, 112])
+WHITE_GROUNDS = [Ground("plain", (0.85,) * 3), Ground(cloth, (0.8,) * 3, 0.03)]
+
+
+def white_on_white(ground, seed, tmp_path):
+    rng = np.random.default_rng([96, seed])
     white = Sheath(colour=(0.85, 0.85, 0.85), gloss=0.2)
     picture = render(bow_scene(rng, light=directional(rng), sheath=white, ground=ground, noise=0.01))
     cv2.imwrite(str(tmp_path / "white.png"), picture.pixels)
-    found = trace_photo(tmp_path / "white.png", diameter_px=DIAMETER * 12e3)
+    return trace_photo(tmp_path / "white.png", diameter_px=DIAMETER * 12e3)
+
+
+@pytest.mark.parametrize(("ground", "seed"), [(WHITE_GROUNDS[0], 29), (WHITE_GROUNDS[1], 14)])
+def test_strips_of_no_contrast_are_refused_with_a_reason(ground, seed, tmp_path):
+    """Of strips that are all paler than what is beside them none was left to choose from: the program ended there."""
+    found = white_on_white(ground, seed, tmp_path)
+    assert isinstance(found, Rejected) and found.code != "photo/program-error"
+
+
+@pytest.mark.parametrize("ground", WHITE_GROUNDS)
+def test_shades_of_a_white_cable_on_white_are_no_edges(ground, tmp_path):
+    found = white_on_white(ground, 112, tmp_path)
     # 20 and 25 px beside the cable before, with 3.6 and 2 px stated
     assert isinstance(found, Rejected)
     assert found.code in ("photo/outline", "photo/contrast")
