@@ -67,21 +67,27 @@ READ = 31
 
 
 def widening(
-    grid: ErrorGrid, posterior: Posterior, base: Fit, suspicion: Suspicion, centre: Centre, *, own: Fit | None = None
+    grid: ErrorGrid,
+    posterior: Posterior,
+    base: Fit,
+    suspicion: Suspicion,
+    centre: Centre,
+    *,
+    own: tuple[Fit, Fit] | None = None,
 ) -> Widening:
     """What all hypotheses add to the band of a curve.
 
-    ``own``: the refit whose law, identified again, the curve is; it lies about the curve itself. Without one the curve
-    is that of the base model without something else, fitted by way one.
+    ``own``: a refit, and that refit with its law identified again, whose curve it is: there the model is linear enough
+    for what each error model says of it. Without them the curve is that of the base model without something else,
+    fitted by way one.
     """
-    nearest = own or base
-    # what was stated is the mean over all priors of the law for data as wrong as they say
+    refit, nearest = own or (base, base)
     here, (move, told) = stated(nearest, centre.kappa), as_told(grid, nearest)
-    offset = centre.values - here.values - here.rows @ move
-    shifts = {(id(nearest), False): offset} | ({} if own is None else {(id(own), True): offset})
+    # what way one states is the mean over all priors of the law for data as wrong as they say
+    offset = np.zeros_like(centre.values) if own else centre.values - here.values - here.rows @ move
     parts = [
-        *_refits(grid, posterior, base, centre, shifts),
-        _unfitted(grid, posterior, base, suspicion, centre, offset if own is None else np.zeros_like(offset)),
+        *_refits(grid, posterior, base, centre, {id(refit): nearest}, offset),
+        _unfitted(grid, posterior, base, suspicion, centre, offset),
     ]
     weight = np.concatenate([part.weight for part in parts])
     mean = np.vstack([part.mean for part in parts])
@@ -95,9 +101,13 @@ def widening(
 
 
 def _refits(
-    grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Centre, shifts: dict[tuple[int, bool], Array]
+    grid: ErrorGrid, posterior: Posterior, base: Fit, centre: Centre, again: dict[int, Fit], offset: Array
 ) -> Iterator[_Parts]:
-    """Components of the base model and of every refit, for the error models that count; some lie beside their fit."""
+    """Components of the base model and of every refit, for the error models that count.
+
+    ``again``: what is looked at in the place of the fit that is the answer; without something else that lies beside its
+    fit by an ``offset`` (n + 1,).
+    """
     chances: dict[int, tuple[Fit, dict[bool, float]]] = {}
     for one in posterior.believed:
         fitted = one.found.fitted if one.found else base
@@ -105,14 +115,15 @@ def _refits(
             chance = chances.setdefault(id(fitted), (fitted, {}))[1]
             disturbed = one.something_else and not (one.found and one.found.begun)
             chance[disturbed] = chance.get(disturbed, 0.0) + one.probability
-    for fitted, chance in chances.values():
+    for own, (fitted, chance) in chances.items():
+        fitted = again.get(own, fitted)
         here = stated(fitted, centre.kappa)
         found = moments(grid if True in chance else grid.plain, fitted, negligible=NEGLIGIBLE)
         for rest, probability in chance.items():
-            own = found.rest == rest
-            root = here.rows @ factor_of(found.covariance[own])
-            mean = here.values + shifts.get((id(fitted), rest), 0.0) - centre.values + found.move[own] @ here.rows.T
-            yield _Parts(probability * found.weight[own], mean, root)
+            these, beside = found.rest == rest, offset if own in again and not rest else 0.0
+            root = here.rows @ factor_of(found.covariance[these])
+            mean = here.values + beside - centre.values + found.move[these] @ here.rows.T
+            yield _Parts(probability * found.weight[these], mean, root)
 
 
 def _unfitted(

@@ -98,8 +98,10 @@ def extended_curve(again: Identified, settings: DiagnosisSettings) -> Curve:
     return curve(again.fitted, covariance=again.covariance, other=again.other)
 
 
-def all_believed(bench: Workbench, conclusion: Conclusion, curve: Curve, own: Fit | None = None) -> Widening:
-    """What all hypotheses add to the band of a curve; ``own``: the refit whose law, identified again, it is."""
+def all_believed(
+    bench: Workbench, conclusion: Conclusion, curve: Curve, own: tuple[Fit, Fit] | None = None
+) -> Widening:
+    """What all hypotheses add to the band of a curve; ``own`` as in `widening`."""
     return widening(conclusion.grid, conclusion.posterior, bench.base, bench.suspicion, centre_of(curve), own=own)
 
 

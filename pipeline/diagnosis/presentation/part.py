@@ -78,8 +78,9 @@ def present(
     # the answer is the curve that all that is believed leaves the narrower band, with that band
     wider = None if extended is not None and word != "unexplained" else all_believed(bench, conclusion, plain)
     refuted = False
-    if extended is not None and accepted is not None:
-        extended = all_believed(bench, conclusion, extended, accepted.fitted).of(extended)
+    if extended is not None and accepted is not None and again is not None:
+        own = accepted.fitted, again.fitted
+        extended = all_believed(bench, conclusion, extended, own).of(extended)
         refuted = wider is not None and known_to(wider.of(plain)) < known_to(extended)
     leftover = described(bench, conclusion)
     believed, none = hypotheses(bench, conclusion)

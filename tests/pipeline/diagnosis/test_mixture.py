@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,14 +13,24 @@ from fixtures.continuum import Cable
 from fixtures.effects import LARGEST, PROTOCOLS
 from fixtures.hidden import hidden_test
 from fixtures.trials import alien_size
+from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.load_cell import ForceGain
+from pipeline.diagnosis.explanations.single_cause import refit_one
+from pipeline.diagnosis.fits.extended import curve as curve_of
+from pipeline.diagnosis.fits.identified_again import identified_again
+from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.diagnosis.posterior.error_grid import error_grid
 from pipeline.diagnosis.posterior.evidence import SIZES, _sized
-from pipeline.diagnosis.posterior.mixture import _half_width
+from pipeline.diagnosis.posterior.mixture import _half_width, centre_of, widening
+from pipeline.faults import faults_of_input
 from pipeline.identify.parts import curve
 from pipeline.identify.ways import identify_test
 from pipeline.result import Curve, Widening
+from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.settings.identify import IdentifySettings
 from tests.pipeline.diagnosis.among import among
+
+SETTINGS = DiagnosisSettings()
 
 
 def test_half_width_holds_95_percent_of_what_is_drawn():
@@ -94,3 +105,27 @@ def test_the_band_grows_with_what_no_cause_makes(sticks):
     else:
         # what is believed beside the base model of a specimen without effect adds less than the noise itself
         assert part.verdict == "adequate" and np.median(std / curve(found.inverse).tangent_std_Nm2) < 1.5
+
+
+def test_the_band_is_that_of_the_law_that_is_stated():
+    """A refit's law may run off where nothing holds it; the error models speak of the law that is the answer.
+
+    About the refit they were 5 in log f_EI apart at rest, and the band of a constant law was 270 % wide there.
+    """
+    causes = [cause for cause in CATALOGUE if cause.name == "bearing_friction"]
+    test = hidden_test(Cable(bearing_friction=3e-3), PROTOCOLS["loop"], largest=LARGEST, seed=47)
+    bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
+    refit = refit_one(bench.observation, bench.base, bench.suspicion, 0).fitted
+    again = identified_again(bench.observation, refit)
+    answer = curve_of(again.fitted, covariance=again.covariance)
+    law = slice(0, refit.extension.base.law.size)
+    astray = refit.vector.copy()
+    astray[law] += 2.0 * np.cos(2.0 * np.arange(law.stop))
+    astray = replace(refit, vector=astray)
+    one = SimpleNamespace(
+        found=SimpleNamespace(fitted=astray, begun=False), causes=(0,), something_else=False, probability=1.0
+    )
+    grid, centre = error_grid(bench.observation, bench.facts), centre_of(answer)
+    own = astray, again.fitted
+    wider = widening(grid, SimpleNamespace(believed=[one]), bench.base, bench.suspicion, centre, own=own)
+    assert np.linalg.norm(np.array(wider.tangent_factor), axis=1).max() < 0.02
