@@ -31,7 +31,9 @@ _STEADY = 0.1  # of what camera and edges explain: a width as constant as that i
 _LEVEL = 1.0 / 512.0  # of full range; half a level of 8 bits: no photo is calmer than its rounding
 _CALM_PX, _CALM = 0.5, 0.04  # width's scatter that every camera makes: px of halo, JPEG and grid; share of the width
 _ALIKE = 0.25  # of the step between strip and ground; grey levels nearer than that are those of one thing
-_ALONG = 5  # sections pooled for the width's constancy: two to three widths, over which an outline's waves average
+_ALONG = 5  # sections pooled for the width's constancy, unless its waves are longer
+_LEAST_WAVES = 6  # of a strip whose outline swells and narrows again and again: fewer may be anything
+_REPEATED = 0.5  # correlation of the width with itself one wave on: of any other widths it is less
 
 
 @dataclass(frozen=True)
@@ -186,8 +188,20 @@ def _steps(blocks: Array, offset: Array, places: Array, reach: int) -> Array:
 
 
 def _unsteady(widths: Array, width: float, std: float, grid: float) -> float:
-    calm = np.convolve(widths, np.ones(_ALONG) / _ALONG, mode="valid") if len(widths) > _ALONG else widths
+    along = _wave(widths)
+    calm = np.convolve(widths, np.ones(along) / along, mode="valid") if len(widths) > along else widths
     return scatter(calm) / max(_CALM_PX * grid, _CALM * width, 1.5 * std)
+
+
+def _wave(widths: Array) -> int:
+    """Sections over which an outline's waves average: those of a wave that repeats itself all along, as of a twist."""
+    off = widths - median(widths)
+    alike = np.correlate(off, off, mode="full")[len(off) - 1 :][: len(off) // _LEAST_WAVES]
+    if not (alike < 0.0).any():
+        return _ALONG
+    down = int(np.argmax(alike < 0.0))
+    length = down + int(np.argmax(alike[down:]))
+    return max(_ALONG, length) if alike[length] > _REPEATED * alike[0] else _ALONG
 
 
 def _crossed(

@@ -12,7 +12,7 @@ ramps is kept: it is the scale of the error that no averaging removes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -44,6 +44,8 @@ _USUAL_RAMP = 0.07
 halo, grid and texture: of thin cables, whose few pixels do not tell them apart, free ramps moved the midline by a third
 more.
 """
+_LEAST_OF_USUAL = 0.1  # of the usual step; a section of less is mostly noise
+_ITERATIONS = 5  # of edges on sections, at most
 _PROFILE_WINDOWS = 16  # along the cable; in each, blur and shading of the edges are found: light turns slowly
 
 
@@ -114,6 +116,21 @@ def _shaded(offset: Real, place: Real, blur: Real, step: Real, ramps: tuple[Real
     shape, inside, outside, density = profile(offset, place, blur)
     value = step * shape + ramps[0] * inside + ramps[1] * outside
     return value, step * density + ramps[0] + (ramps[1] - ramps[0]) * shape
+
+
+def in_one_light(pixels: Pixels) -> tuple[Pixels, Array, Array]:
+    """Pixels with level and step of all sections alike: strands of several colours have one profile.
+
+    Their values are ``zero + gain * value``, with zero and gain ``(2, n)``.
+    """
+    each, shape = max(1, pixels.across // 4), pixels.value.shape
+    rows = pixels.value.reshape(*shape[:2], -1, pixels.across)
+    inner, outer = (medians(part.reshape(*shape[:2], -1), axis=2) for part in (rows[..., :each], rows[..., -each:]))
+    usual = median(outer - inner)
+    gain = usual / np.maximum(outer - inner, _LEAST_OF_USUAL * usual)
+    zero = median(outer) - gain * outer
+    alike = np.asarray(zero[..., None] + gain[..., None] * pixels.value, np.float32)
+    return replace(pixels, value=alike), zero, gain
 
 
 def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) -> tuple[Profiles, Profiles | None]:
@@ -271,11 +288,17 @@ class Edges:
     step: Array
 
 
-def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int = 5) -> Edges:
-    """Place, level and step of the edges on every section; blur and relative slopes come from the profiles."""
+def fit_edges(
+    pixels: Pixels, s: Array, profiles: Profiles, *, zero: Array | float = 0.0, gain: Array | float = 1.0
+) -> Edges:
+    """Place, level and step of the edges on every section; blur and relative slopes come from the profiles.
+
+    The profiles are those of values ``zero + gain * value``; see `in_one_light`.
+    """
     shape, count = pixels.value.shape[:2], pixels.value.shape[2]
     offset, value = pixels.offset.reshape(-1, count), pixels.value.reshape(-1, count)
-    place, level, step = (profiles.at(s, name).ravel() for name in ("place", "level", "step"))
+    place, level, step = (profiles.at(s, name) for name in ("place", "level", "step"))
+    place, level, step = place.ravel(), ((level - zero) / gain).ravel(), (step / gain).ravel()
     blur, inside, outside = (
         profiles.at(s, name).reshape(-1, 1).astype(np.float32) for name in ("blur", "inside", "outside")
     )
@@ -284,7 +307,7 @@ def fit_edges(pixels: Pixels, s: Array, profiles: Profiles, *, iterations: int =
     basis, one = np.empty((len(value), 3, count), np.float32), np.ones((1, 1), np.float32)
     basis[:, 0] = 1.0
     gram, weight = np.zeros((len(value), 3, 3)), np.ones_like(value)
-    for _ in range(iterations):
+    for _ in range(_ITERATIONS):
         place32, level32, step32 = (a.astype(np.float32)[:, None] for a in (place, level, step))
         basis[:, 1], slope = _shaded(offset, place32, blur, one, (inside, outside))
         basis[:, 2] = -step32 * slope

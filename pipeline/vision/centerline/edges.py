@@ -18,23 +18,26 @@ noise n and contrast A has a standard deviation of ``(n/A) sqrt(2 sqrt(pi) w)`` 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.records import Array
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Float32, Pixels
-from pipeline.vision.median import median, medians
+from pipeline.vision.median import median, medians, scatter
 from pipeline.vision.search.crosscut import steepest
 
 SEARCH_RADII = 0.35
 """Of the radius; how far from its expected place an edge is sought: a path misled by a shadow is off by less, the next
 false edge (highlight, text) is mostly farther.
 """
+
+_TOGETHER = 2.0  # scatter of half the width over that of the middle; edges that err each by itself have 1
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,17 @@ class Found:
     s: Array
     edges: Array
     usable: NDArray[np.bool_]
+
+    @property
+    def swing(self) -> float:
+        """By how much both edges go out and in together, px (robust standard deviation); 0 if each errs by itself."""
+        half, middle = (scatter(0.5 * self.edges[self.usable] @ way) for way in ((-1.0, 1.0), (1.0, 1.0)))
+        return half if half > _TOGETHER * middle else 0.0
+
+    def outline(self, s: Array) -> Array:
+        """Distances ``(2, n)`` px of both edges from the path at sections ``s``, positive outward."""
+        calm = median_filter(self.edges[self.usable] * (-1.0, 1.0), size=(3, 1), mode="nearest")
+        return np.stack([np.interp(s, self.s[self.usable], side) for side in calm.T])
 
 
 def search_edges(
@@ -125,27 +139,33 @@ def _offset(rise: Array, t: Array, half_width: float, tolerance: float) -> tuple
 
 
 def edge_pixels(
-    ground: Ground, curve: PlaneCurve, s: Array, *, rows: int, half_width: float, window: tuple[float, float]
+    ground: Ground,
+    curve: PlaneCurve,
+    s: Array,
+    *,
+    rows: int,
+    outline: Callable[[Array], Array],
+    window: tuple[float, float],
 ) -> Pixels:
     """Pixels nearest to a grid about both edges: ``rows`` a section along s, one a px across; see `in_picture`.
 
     Parameters
     ----------
-    half_width : px
-        Distance of the expected edges from the path.
+    outline : arc lengths (n,) to (2, n) px
+        Distances of the expected edges from the path.
     window : (inside, outside) px
     """
     spacing = median(np.diff(s)) / rows
     all_s = (s[:, None] + (np.arange(rows) - 0.5 * (rows - 1)) * spacing).ravel()
     where, angle = curve.at(all_s)
     across = normals(angle)
-    out = half_width + np.arange(-np.ceil(window[0]), np.ceil(window[1]) + 1.0)
-    t = np.stack([-out, out])[:, None, :]  # side, row, pixel
+    out, expected = np.arange(-np.ceil(window[0]), np.ceil(window[1]) + 1.0), outline(all_s)[..., None]
+    t = np.array([-1.0, 1.0])[:, None, None] * (expected + out)  # side, row, pixel
     u = np.rint(where[:, :1] + across[:, :1] * t)
     v = np.rint(where[:, 1:] + across[:, 1:] * t)
     offset = (
         np.array([-1.0, 1.0])[:, None, None] * ((u - where[:, :1]) * across[:, :1] + (v - where[:, 1:]) * across[:, 1:])
-        - half_width
+        - expected
     )
     height, width = ground.grey.shape
     column = np.clip(u.astype(np.int64) - ground.origin_px[0], 0, width - 1)

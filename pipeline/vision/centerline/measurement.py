@@ -35,7 +35,7 @@ from pipeline.vision.centerline.refusal import (
     refusal,
     refusal_of_band,
 )
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import ChordFrame, PlaneMap, chord_frame
@@ -99,6 +99,8 @@ class Followed:
         """Half the width along the sections that live on both edges: errors of the midline without its bend."""
         used = (self.fit.weight > 0.0) & (self.sections.balance > _LEAST_BALANCE)
         half = 0.5 * (self.sections.balance * (self.width - median(self.width)))[used]
+        if self.sections.waves:
+            half *= min(1.0, scatter(self.fit.residual[used], 0.0) / scatter(half, 0.0))
         return HalfWidths(self.fit.s[used], half, self.fit.point_std[used], self.fit.smooth.correlation_length)
 
     def without(self, wiggle: Array, *, spare: float, lay_std: float) -> Followed:

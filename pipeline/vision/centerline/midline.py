@@ -36,9 +36,9 @@ from scipy.ndimage import binary_opening, maximum_filter1d, median_filter
 
 from pipeline.records import Array
 from pipeline.vision.centerline.curvature import PlaneCurve
-from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles
-from pipeline.vision.centerline.edges import Ground, edge_pixels, normals
-from pipeline.vision.median import MAD_TO_STD, median, medians, scatter
+from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles, in_one_light
+from pipeline.vision.centerline.edges import Found, Ground, edge_pixels, normals
+from pipeline.vision.median import MAD_TO_STD, median, medians, quantile, scatter
 
 LEAST_SECTIONS = 12  # measured, or found in the search, at all; fewer do not fix a curve that bends both ways
 _WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
@@ -98,6 +98,10 @@ class Sections:
     balance : (k,)
         ``2 sqrt(v1 v2) / (v1 + v2)``: 1 where both edges count alike, 0 where only one counts. So much of half the
         width's error is the midpoint's.
+    waves : bool
+        Both edges go out and in together, as those of twisted wires: the width's waves are not the midline's.
+    caliper : px
+        Width that a caliper would tell: the median, of wires that wind about each other that of their widest places.
     systematic_std : px
     share : float
         Of the sections asked for, those that were measured.
@@ -113,6 +117,8 @@ class Sections:
     std: Array
     width: Array
     balance: Array
+    waves: bool
+    caliper: float
     systematic_std: float
     share: float
     contrast: float
@@ -136,23 +142,36 @@ def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cov
 
 
 def measure_sections(
-    ground: Ground, curve: PlaneCurve, s: Array, *, half_width: float, diameter: float | None, blur: float
+    ground: Ground,
+    curve: PlaneCurve,
+    s: Array,
+    *,
+    half_width: float,
+    diameter: float | None,
+    blur: float,
+    found: Found | None = None,
 ) -> Sections | None:
-    """Sections at ``s`` of a path that follows the cable within a fraction of a pixel; None if hardly any is left."""
+    """Sections at ``s`` of a path that follows the cable within a fraction of a pixel; None if hardly any is left.
+
+    Edges that were ``found`` along the path lead where they wave farther than the windows of the profiles reach.
+    """
     inside = min(_INSIDE_RADII * half_width, _LONGEST_SIDE_PX)
     outside = min(_OUTSIDE_RADII * half_width, _LONGEST_SIDE_PX)
     least = EDGE_WINDOW_BLURS * blur + 0.5  # half a pixel for what the path may be off
     window = (max(inside, least), max(outside, least))
     rows = max(1, int(median(np.diff(s))))
-    pixels = edge_pixels(ground, curve, s, rows=rows, half_width=half_width, window=window)
-    free, held = fit_profiles(pixels, s, blur=max(blur, 0.5), thin=half_width < _SMALL_RADIUS_PX)
+    waves = found is not None and found.swing > window[1] - EDGE_WINDOW_BLURS * blur
+    outline = found.outline if found is not None and waves else lambda s: np.full((2, len(s)), half_width)
+    pixels = edge_pixels(ground, curve, s, rows=rows, outline=outline, window=window)
+    alike, zero, gain = in_one_light(pixels) if waves else (pixels, 0.0, 1.0)
+    free, held = fit_profiles(alike, s, blur=max(blur, 0.5), thin=half_width < _SMALL_RADIUS_PX)
     profiles = held if held is not None and _serves(held, free, half_width, diameter) else free
-    edges = fit_edges(pixels, s, profiles)
+    edges = fit_edges(pixels, s, profiles, zero=zero, gain=gain)
     place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)
     if good.sum(axis=0).min() < LEAST_SECTIONS:
         return None
-    place, std, good = _consistent(place, std, good, _EDGE_OUTLIER)
+    place, std, good = _consistent(place, std, good, _EDGE_OUTLIER, together=1.0 if waves else -1.0)
     keep = np.asarray(good.any(axis=1))
     keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width)
     keep = _between_pairs(keep, keep & good.all(axis=1))
@@ -171,15 +190,21 @@ def measure_sections(
     inward = 0.5 * likely - half_width - place.T
     off = trust[0] * inward[0] - trust[1] * inward[1]
     # Both edges are moved alike: their distance stays what was measured.
-    aside = (off - 0.5 * (place[:, 1] - place[:, 0]))[:, None]
+    aside = off - 0.5 * (place[:, 1] - place[:, 0])
+    expected = outline(s)
+    first, second = (expected + place.T + [-aside, aside])[..., None]
+    width += expected.sum(axis=0) - 2.0 * half_width
+    caliper = quantile(width, 0.9) if waves else median(width)
     return Sections(
         s=s,
-        first=where - (half_width + place[:, :1] - aside) * across,
-        second=where + (half_width + place[:, 1:] + aside) * across,
+        first=where - first * across,
+        second=where + second * across,
         std=np.hypot(*(trust * std.T)),
         width=width,
         balance=2.0 * np.sqrt(trust[0] * trust[1]),
-        systematic_std=_systematic(profiles, s, median(width), doubt, diameter),
+        waves=waves,
+        caliper=caliper,
+        systematic_std=_systematic(profiles, s, caliper, doubt, diameter),
         share=float(np.mean(keep)),
         contrast=median(step),
         noise=median(profiles.noise),
@@ -232,23 +257,27 @@ def _running_median(values: Array) -> Array:
 
 
 def _consistent(
-    place: Array, std: Array, good: NDArray[np.bool_], outlier: float
+    place: Array, std: Array, good: NDArray[np.bool_], outlier: float, *, together: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Edges that contradict their neighbours replaced by the other edge and the local width."""
+    """Edges that contradict their neighbours replaced by the other edge and the local width.
+
+    ``together`` is -1 where the width lasts while both edges go to one side, 1 where they go out and in together.
+    """
     index = np.arange(len(place))
     filled = np.column_stack([np.interp(index, index[g], p[g]) for p, g in zip(place.T, good.T, strict=True)])
     local = np.column_stack([_running_median(p) for p in filled.T])
     off = np.abs(filled - local)
     limit = outlier * MAD_TO_STD * medians(off, axis=0) + 0.02  # px; a floor for pictures without noise
     good = good & (off < limit)
-    width = local.sum(axis=1)
     out, spread = filled.copy(), std.copy()
     for side, other in ((0, 1), (1, 0)):
         lost = ~good[:, side] & good[:, other]
-        out[lost, side] = width[lost] - filled[lost, other]
+        out[lost, side] = local[lost, side] + together * (filled - local)[lost, other]
         spread[lost, side] = (
             2.0 * std[lost, other]
         )  # the same error again, with the other sign: midpoint moves by all of it
+    if together > 0.0:  # where wires cross, the one in front may stand out more, but the outline has a corner
+        spread = np.maximum(spread, medians(spread, axis=0))
     return out, spread, good
 
 

@@ -10,7 +10,14 @@ from pipeline.messages import Message
 from pipeline.records import Array, Rejected
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
-from pipeline.vision.centerline.edges import SEARCH_RADII, Ground, in_picture, normals, search_edges
+from pipeline.vision.centerline.edges import (
+    SEARCH_RADII,
+    Found,
+    Ground,
+    in_picture,
+    normals,
+    search_edges,
+)
 from pipeline.vision.centerline.midline import (
     EDGE_WINDOW_BLURS,
     LEAST_SECTIONS,
@@ -142,11 +149,12 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
         return _lost(rough, float(np.mean(usable)))
     diameter, half_width = 2.0 * half_width, 0.5 * middle
     where, angle = path.at(found.s)
-    points = where + found.edges.mean(axis=1)[:, None] * normals(angle)
-    path = follow_points(points[usable], start=path, s=found.s[usable], order=_PENALTY_ORDER)
+    edges = where[:, None] + found.edges[..., None] * normals(angle)[:, None]
+    path = follow_points(edges.mean(axis=1)[usable], start=path, s=found.s[usable], order=_PENALTY_ORDER)
+    where, angle = path.at(found.s)
     if blur is None:
-        where, angle = path.at(found.s)
         blur = median(edge_spreads(rough.grey, where - ground.origin_px, normals(angle), middle))
+    found = Found(found.s, ((edges - where[:, None]) * normals(angle)[:, None]).sum(axis=2), usable)
     covers = _covers(rough, blur)
     count = round((span[1] - span[0]) / (_SECTION_SPACING_DIAMETERS * diameter))
     count = min(max(count, _MIN_SECTIONS), _MAX_SECTIONS, int(span[1] - span[0]))
@@ -158,7 +166,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     if len(s) < LEAST_SECTIONS:
         return _lost(rough, 0.0)
     stated = diameter if known else None
-    sections = measure_sections(ground, path, s, half_width=half_width, diameter=stated, blur=blur)
+    sections = measure_sections(ground, path, s, half_width=half_width, diameter=stated, blur=blur, found=found)
     if sections is None:
         return _lost(rough, 0.0)
     softest = min(sections.softest, half_width / EDGE_WINDOW_BLURS)  # from there on one edge's window holds the other

@@ -53,9 +53,11 @@ def refusal(
     """Why a fitted curve is not the cable's; ``width`` (n,) m of the cable on the sections, ``diameter`` m if known."""
     evidence = evidence_of(rough, sections)
     middle = middle_width(width)[0]
-    figure = evidence.figures | ({} if diameter is None else {"width_over_diameter": middle / diameter})
+    scale = middle / median(sections.width)
+    whole = scale * sections.caliper
+    figure = evidence.figures | ({} if diameter is None else {"width_over_diameter": whole / diameter})
     told = (
-        _another_width(middle, diameter, sections.softest * middle / median(sections.width))
+        _another_width(whole, diameter, scale * sections.softest)
         or (None if evidence.enough else unlike_a_cable(evidence))
         or (None if evidence.bordered else _uneven(fit, sections, middle))
         or _beside_cover(rough, fit, chord, middle)

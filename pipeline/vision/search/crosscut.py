@@ -300,6 +300,15 @@ def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
     return np.array(course[::-1])
 
 
+def _course_totals(score: Array, cost: float) -> Array:
+    """Largest sums ``(w,)`` along courses of `_best_course`, of scores ``(n, w, k)``."""
+    total = np.pad(score[0], ((0, 0), (1, 1)), constant_values=-np.inf)
+    for row in score[1:]:
+        moved = np.maximum(total[:, :-2], total[:, 2:]) - cost
+        total[:, 1:-1] = np.maximum(total[:, 1:-1], moved) + row
+    return np.asarray(total.max(axis=1))
+
+
 def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, known: bool) -> float:
     """Distance in columns of the edges that fits best along the whole strip; ``near`` are the columns of its middle.
 
@@ -308,7 +317,7 @@ def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, 
     """
     tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, _PAIR_WIDTHS)
     rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
-    totals = _pair_score(rise, fall, near, tried).max(axis=2).mean(axis=0)
+    totals = _course_totals(_pair_score(rise, fall, near, tried), _PAIR_WANDER_COST) / len(rise)
     if known:
         trust = np.exp(-0.5 * (np.log(tried / width) / _PAIR_WIDTH_STD) ** 2)
         return float(tried[np.argmax(totals * trust)])

@@ -191,28 +191,6 @@ def test_a_motion_by_a_third_of_the_width_is_in_the_band(make, most_px):
     assert np.mean(covered) > 0.9
 
 
-@pytest.mark.parametrize("seed", [15, 17, 18, 19])
-def test_an_outline_that_swings_is_called_so_and_not_noise(seed):
-    """Two strands twisted about each other, each half as wide as the cable: a dark one and a red one."""
-    rng = np.random.default_rng(seed)
-    scene = even(rng)
-    picture = render(scene)
-    rough = rough_cable(scene, picture, rng)
-    radius, ground = rough.half_width_px, int(np.median(picture.pixels))
-    path = rough.path_px
-    pixels = np.full_like(picture.pixels, ground)
-    step = np.gradient(path, axis=0)
-    normal = np.column_stack([-step[:, 1], step[:, 0]]) / np.hypot(*step.T)[:, None]
-    along = np.cumsum(np.hypot(*step.T))
-    for side, grey in ((1.0, 30), (-1.0, 90)):
-        swing = side * 0.5 * radius * np.sin(2.0 * np.pi * along / (8.0 * radius))
-        for u, v in path + swing[:, None] * normal:
-            cv2.circle(pixels, (round(u), round(v)), round(0.5 * radius), (grey,) * 3, -1)
-    found = refused(rough_cable(scene, picture, rng, pixels=pixels), scene)
-    assert isinstance(found, Rejected)
-    assert found.code in ("photo/outline", "photo/bearing", "photo/width")  # or beside its covers, which is as true
-
-
 def test_strands_of_two_greys_that_swell_the_outline_are_traced():
     """A rope of dark and light strands: half of its contrast is pattern, which is no noise, and its error is stated."""
     rng = np.random.default_rng(14)
