@@ -65,8 +65,8 @@ class Evidence(NamedTuple):
     """Log probability of the data, by the model alone (``plain``) and with something else besides (``rest``).
 
     Without something else: ``moved``: probability that displacements scatter beyond the log, and by how much if so (m);
-    ``rig``: probability that zeros, length and camera are off by what they ordinarily are, and by how much if so, in
-    those standard deviations.
+    ``rig``: probability that the rig is off by what rigs ordinarily are, and by how much if so, in those standard
+    deviations.
     """
 
     plain: float
