@@ -174,9 +174,10 @@ def test_three_loading_steps_show_a_growing_pre_curvature():
 def test_a_load_at_an_angle_is_named_however_the_cable_was_mounted(tared):
     """Both components, and the zero of displacement under the load or where the cable would lie without it.
 
-    Against the causes that came before it in trials; one of its components alone loses to them.
+    Against the causes that came before it in trials; one of its components alone loses to them. A length and a lean of
+    the camera that are off as every rig's are make half such a load along the chord needless.
     """
-    cable = Cable(load=(0.28, -0.2), tared=tared)
+    cable = Cable(load=(0.6, -0.4), tared=tared)
     names = ("in_plane_load", "stiffness_varying", "displacement_offset", "force_offset")
     causes = [cause for cause in CATALOGUE if cause.name in names]
     test = hidden_test(cable, SIX, largest=LARGEST, seed=15)
