@@ -25,6 +25,8 @@ RESIDUAL_TOLERANCE = 1e-9
 #: Largest turn of an edge in one Newton step, rad.
 STEP_LIMIT = 0.8
 ITERATIONS = 25
+#: Residual, relative as above, of a state that is none: a trial law may rise so steeply that numbers overflow next.
+BEYOND_NUMBERS = 1e100
 #: Largest turn of an edge in a step downhill, rad.
 DESCENT_LIMIT = 0.3
 #: Steps after which a path, or the way down to rest, is given up; a nearly straight bar (K0 L = 2e-8) needs 270.
@@ -108,6 +110,8 @@ def newton(system: System, start: Start) -> Trial:
     balance = system.balance(angles, R)
     norm = system.misfit(balance)
     for count in range(1, ITERATIONS + 1):
+        if not norm < BEYOND_NUMBERS:
+            return Trial(angles, R, balance, count, Outcome.STALLED)
         here = system.eliminated(balance, -balance.gradient[:, None], -balance.gap[:, None])
         dalpha, dR = system.solution(here)
         step = abs(float(dalpha[idamax(dalpha[:, 0]), 0]))

@@ -355,3 +355,11 @@ def test_unloaded_between_good_steps_continues_after_a_bad_one() -> None:
     assert steps[2].good
     assert steps[2].force == pytest.approx(steps[0].force, rel=1e-9)
     assert replace(test, zero="length").zero_chord == 0.2
+
+
+def test_a_state_beyond_all_numbers_is_left_at_once() -> None:
+    """A step on from moments of 1e175 N m, which a trial law made, overflowed."""
+    test = BendingTest(0.2, 0.01)
+    angles = 1e130 * np.cos(np.arange(len(test.rod.edges)))
+    trial = newton(System(test.rod, Hold(chord=0.18), test.rod.virgin), Start(angles, np.zeros(2)))
+    assert (trial.outcome, trial.steps) == (Outcome.STALLED, 1)
