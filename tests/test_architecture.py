@@ -97,7 +97,7 @@ INSIDE = {
         ("stated_width",),
         ("series",),
     ],
-    "pipeline.vision.scale": [("plane",), ("calibration", "plane_fit"), ("board",)],
+    "pipeline.vision.scale": [("plane",), ("calibration", "corners", "plane_fit"), ("board",)],
     "pipeline.vision.search": [
         ("strips", "backdrop"),
         ("crosscut",),

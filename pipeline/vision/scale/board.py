@@ -1,8 +1,7 @@
 """Photos of a chessboard or ChArUco board to the calibration: corners, plane, height of the cable axis above it.
 
 The board lies in the plane on which the cable lies; one photo of it is enough (`pipeline.vision.scale.plane_fit`). Its
-corners are found by OpenCV on a reduced photo and placed on it at its full size, each to 0.02 to 0.07 px: a hundred of
-them tell the scale thirty times more surely than a printed board is true.
+corners are found by OpenCV and placed by `pipeline.vision.scale.corners`.
 
 The cable axis lies half a diameter above the board. A ray through the board at (x, y) passes the height h at
 ``(x, y) + h/Z (foot - (x, y))``, Z the camera's distance from the plane: a change of scale by 1 - h/Z, whatever
@@ -16,18 +15,17 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from pipeline.errors import InputError
 from pipeline.messages import Message
 from pipeline.records import Array, Board, CameraSpec, Finding, Rejected, Scale, doubtful, inferred
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.scale import CalibrationSettings
-from pipeline.vision.median import median
-from pipeline.vision.photo import Photo, Pixels, load_photo
+from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.scale.calibration import Calibration
-from pipeline.vision.scale.plane import PlaneMap
-from pipeline.vision.scale.plane_fit import BoardView, PlaneFit, fit_views
+from pipeline.vision.scale.corners import Window, refine_corners
+from pipeline.vision.scale.plane import PlaneMap, project
+from pipeline.vision.scale.plane_fit import BoardView, PlaneFit, fit_views, homography_of
 
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"}
 _DICTIONARIES = (
@@ -41,9 +39,6 @@ _BOARD_STD = 3e-4  # relative; a printed board measured with a ruler: 0.1 mm on 
 _BOARD_SEARCH_PX = 2000  # px; long side at which the board is searched, corners are refined at full resolution
 MAX_BORDER_STD = 0.002  # relative, scale at the border against the middle; curvature is off by half of it, 0.1 %
 _MAX_BOARD_RMS_PX = 0.5  # px; real boards reach 0.12 to 0.16 px, bent ones do not
-_CORNER_REACH = 0.3  # squares; how far from a corner its edges are read: well before the next corner's
-_CORNER_REACH_PX = (2.0, 11.0)  # px; longer edges hardly help, and a lens bends them
-_CORNER_MOVE = 0.15  # squares; a corner found farther from its start is another thing
 
 
 def calibrate_by_board(camera: CameraSpec, diameter_m: float, settings: VisionSettings) -> list[Calibration]:
@@ -111,9 +106,7 @@ def _read_views(folder: Path, board: Board, settings: VisionSettings) -> tuple[l
 
 def find_board(photo: Photo, board: Board) -> BoardView | Rejected:
     """Corners of the board on a photo, sub-pixel; rejected with ``calibration/no-corners`` if it is not there."""
-    grey = _grey(photo)
-    if grey.dtype != np.uint8:
-        grey = np.clip(grey * (255.0 / photo.full_scale), 0, 255).astype(np.uint8)
+    grey = _grey8(photo)
     factor = max(1, round(max(photo.size) / _BOARD_SEARCH_PX))
     reduced = cv2.resize(grey, None, fx=1.0 / factor, fy=1.0 / factor, interpolation=cv2.INTER_AREA)
     small = np.asarray(reduced, np.uint8)
@@ -123,7 +116,7 @@ def find_board(photo: Photo, board: Board) -> BoardView | Rejected:
     if found is None or not _tells_plane(found[0], board):
         return missing
     points, uv = found
-    uv = _refined(photo, board, uv * factor + 0.5 * (factor - 1))
+    uv = _refined(photo, board, points, uv * factor + 0.5 * (factor - 1))
     clear = np.isfinite(uv[:, 0])
     if not _tells_plane(points[clear], board):
         return missing
@@ -138,27 +131,27 @@ def _tells_plane(points: Array, board: Board) -> bool:
     return bool(spread > 0.25 * board.square_m)
 
 
-def _refined(photo: Photo, board: Board, uv: Array) -> Array:
-    """Corners ``(n, 2)`` px placed on the photo at its full size and depth, NaN where that leads away from them."""
-    pixels = _grey(photo)
-    square = median(np.asarray(cKDTree(uv).query(uv, 2)[0])[:, 1])
-    # beside a marker of a ChArUco board there is a white margin, of which the marker's blur takes a part
-    share = 0.5 * (1.0 - _marker_m(board) / board.square_m) if board.charuco else _CORNER_REACH
-    half = int(np.clip(share * square, _CORNER_REACH_PX[0], _CORNER_REACH_PX[1]))
-    until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)  # px
-    start = uv.astype(np.float32).reshape(-1, 1, 2)
-    placed = cv2.cornerSubPix(pixels.astype(np.float32), start.copy(), (half, half), (-1, -1), until).reshape(-1, 2)
-    stayed = np.hypot(*(placed - uv).T) < _CORNER_MOVE * square
-    return np.where(stayed[:, None], placed.astype(np.float64), np.nan)
+def _refined(photo: Photo, board: Board, points: Array, uv: Array) -> Array:
+    """Corners ``(n, 2)`` fitted to the photo at its full size and depth, NaN where it shows none."""
+    pixels = photo.pixels if photo.channels == 1 else cv2.cvtColor(photo.pixels, cv2.COLOR_BGR2GRAY)
+    middle, size = uv.mean(axis=0), float(np.ptp(uv))
+    to_picture = np.asarray(np.linalg.inv(homography_of((uv - middle) / size, points)), np.float64)
+    half = 0.5 * board.square_m * np.eye(2)
+    cells = [size * (project(to_picture, points + step) - project(to_picture, points - step)) for step in half]
+    window = Window.of(_marker_m(board) / board.square_m if board.charuco else 0.0)
+    return refine_corners(np.asarray(pixels), uv, np.stack(cells, axis=-1), window)
 
 
 def _marker_m(board: Board) -> float:
     return 0.75 * board.square_m if board.marker_m is None else board.marker_m
 
 
-def _grey(photo: Photo) -> Pixels:
-    """Brightness (h, w), as deep as the photo."""
-    return photo.pixels if photo.channels == 1 else np.asarray(cv2.cvtColor(photo.pixels, cv2.COLOR_BGR2GRAY))
+def _grey8(photo: Photo) -> NDArray[np.uint8]:
+    pixels = photo.pixels if photo.channels == 1 else cv2.cvtColor(photo.pixels, cv2.COLOR_BGR2GRAY)
+    if pixels.dtype == np.uint8:
+        return np.asarray(pixels, np.uint8)
+    levels: NDArray[np.uint8] = np.clip(pixels * (255.0 / photo.full_scale), 0, 255).astype(np.uint8)
+    return levels
 
 
 def _chessboard(grey: NDArray[np.uint8], board: Board) -> tuple[Array, Array] | None:
