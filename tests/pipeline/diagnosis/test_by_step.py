@@ -66,7 +66,7 @@ def test_one_bearing_alone_is_named_with_its_side(name, cable):
     part, covered = found(cable, "loop", 43)
     assert part.verdict == "named" and part.causes[0].name == name, part.headline
     sides = [form.label for form in part.causes[0].forms if form.label.startswith("at the ") or form.width > 0.9]
-    assert covered >= 0.9 and sides
+    assert covered > 0.9 and sides
 
 
 ON_LOADING = Protocol(tuple(i / 6 for i in range(1, 7)), ("loading",) * 6)
