@@ -182,7 +182,7 @@ class BendingTest:
         for side, end in (("left", self.left), ("right", self.right)):
             found |= {f"end_moment_{side}": end.moment, f"clamp_angle_{side}": end.angle or 0.0}
             found |= {f"bearing_stiffness_{side}": end.stiffness, f"bearing_friction_{side}": end.friction_moment}
-            found[f"stick_angle_{side}"] = end.stick_angle
+            found |= {f"bearing_hardening_{side}": end.hardening, f"stick_angle_{side}": end.stick_angle}
         return found
 
     def hold(self, control: Control, value: float) -> Hold:

@@ -276,7 +276,7 @@ class System:
         """Ends where a clamp, a spring, friction or a moment acts: place, support, its angles, sign of its moment."""
         rod, memory, rest = self.rod, self.memory, self.rod.rest_angles
         ends = (0, rod.left, rest[0], memory.left_angle, -1.0), (-1, rod.right, rest[1], memory.right_angle, 1.0)
-        return [e for e in ends if e[1].kind == "clamp" or e[1].stiffness or e[1].friction_moment or e[1].moment]
+        return [e for e in ends if e[1].kind == "clamp" or e[1].moment or not e[1].turns_freely]
 
     def clamps_turning(self, here: Balance, residual: Array) -> tuple[Array, Array]:
         """Change of gradient (n + 2,) and gap (2,) while clamps turn by what they lack in ``residual`` (n + 2,) N m.

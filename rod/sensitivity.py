@@ -151,7 +151,7 @@ def _mounted(test: BendingTest, moves: Directions) -> _Rest:
     zero = moves.scalar("length") if test.zero == "length" else moves.none
     if test.zero == "natural":
         zero = moved(h * sin, cos)
-    held = any(end.kind == "clamp" or end.stiffness or end.friction_moment for end in (rod.left, rod.right))
+    held = any(end.kind == "clamp" or not end.turns_freely for end in (rod.left, rod.right))
     if not held and test.friction_by_step is None:
         return _Rest(moves.none, moves.none, zero)
     left = moved(-h * cos, sin) / -rod.mounted.chord  # the chord frame turns with the right end
@@ -270,11 +270,12 @@ def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, 
     u = (angle - (step.before.left_angle if left else step.before.right_angle)) / support.stick_angle
     moment = moves.scalar(f"end_moment_{side}") * (-1.0 if left else 1.0)
     moment = moment + moves.scalar(f"bearing_stiffness_{side}") * (angle - at_rest)
+    moment = moment + moves.scalar(f"bearing_hardening_{side}") * (angle - at_rest) ** 3
     friction = moves.scalar(f"bearing_friction_{side}") + moves.given(moves.friction_by_step[side], step.before.step)
     moment = moment + friction * min(1.0, max(-1.0, u))
-    if support.stiffness:
+    if slope := support.spring(angle - at_rest)[1]:
         rest = moves.scalar(f"clamp_angle_{side}") if support.angle is not None else rest
-        moment = moment - support.stiffness * rest
+        moment = moment - slope * rest
     if support.friction_moment and -1.0 < u < 1.0:
         slow = slip + u * moves.scalar(f"stick_angle_{side}")
         moment = moment - support.friction_moment / support.stick_angle * slow

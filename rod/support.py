@@ -4,8 +4,9 @@ Each end carries an angle of its own (rad, from x toward y). What acts on that a
 the end of the cable, in the sign of the curvature; "against the turning direction" makes it negative at both ends
 when the cable is bent further, since the left angle then grows and the right one falls:
 
-    left end   m = moment - stiffness (angle - rest) - friction_moment clip((angle - slip) / stick_angle, -1, 1)
-    right end  m = moment + stiffness (angle - rest) + friction_moment clip((angle - slip) / stick_angle, -1, 1)
+    left end   m = moment - spring(angle - rest) - friction_moment clip((angle - slip) / stick_angle, -1, 1)
+    right end  m = moment + spring(angle - rest) + friction_moment clip((angle - slip) / stick_angle, -1, 1)
+    spring(u) = stiffness u + hardening u^3
 
 ``rest`` is the angle in the mounted, force-free position unless given; ``slip`` is the memory of the friction, at the
 start the mounted angle. A Coulomb moment that sticks over a small angle instead of none keeps every step a smooth
@@ -34,6 +35,8 @@ class Support:
         Angle of a clamp, or rest angle of a bearing's spring. None: as mounted.
     stiffness : N m/rad
         Rotational spring of a bearing.
+    hardening : N m/rad^3
+        By which that spring stiffens (or, below 0, softens) with its turn.
     friction_moment : N m
         Coulomb moment of a bearing.
     stick_angle : rad
@@ -48,6 +51,7 @@ class Support:
     kind: Kind = "bearing"
     angle: float | None = None
     stiffness: float = 0.0
+    hardening: float = 0.0
     friction_moment: float = 0.0
     stick_angle: float = 1e-3
     rigid_length: float = 0.0
@@ -60,15 +64,26 @@ class Support:
             raise ValueError(f"stick_angle must be positive, got {self.stick_angle}")
         if not self.rigid_length >= 0.0:
             raise ValueError(f"rigid_length must not be negative, got {self.rigid_length}")
-        if not all(map(isfinite, (self.angle or 0.0, self.stiffness, self.friction_moment, self.moment))):
-            raise ValueError(f"angle, stiffness, friction_moment and moment of a support are finite, got {self}")
+        if not all(
+            map(isfinite, (self.angle or 0.0, self.stiffness, self.hardening, self.friction_moment, self.moment))
+        ):
+            raise ValueError(f"angle, spring, friction_moment and moment of a support are finite, got {self}")
+
+    @property
+    def turns_freely(self) -> bool:
+        """Whether a bearing neither springs nor rubs."""
+        return not (self.stiffness or self.hardening or self.friction_moment)
 
     def moment_at(self, angle: float, rest: float, slip: float) -> tuple[float, float]:
         """Moment against turning (spring and friction, N m) and its derivative by the angle (N m/rad)."""
         u = (angle - slip) / self.stick_angle
         sticking = -1.0 < u < 1.0
-        moment = self.stiffness * (angle - rest) + self.friction_moment * min(1.0, max(-1.0, u))
-        return moment, self.stiffness + (self.friction_moment / self.stick_angle if sticking else 0.0)
+        moment = self.spring(angle - rest)[0] + self.friction_moment * min(1.0, max(-1.0, u))
+        return moment, self.spring(angle - rest)[1] + (self.friction_moment / self.stick_angle if sticking else 0.0)
+
+    def spring(self, turn: float) -> tuple[float, float]:
+        """Moment of the spring at a turn from its rest (N m) and its derivative by it (N m/rad)."""
+        return (self.stiffness + self.hardening * turn**2) * turn, self.stiffness + 3.0 * self.hardening * turn**2
 
     def advanced(self, angle: float, slip: float) -> float:
         """Memory of the friction after a step that ended at ``angle``."""

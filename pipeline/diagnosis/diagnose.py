@@ -14,7 +14,7 @@ from pipeline.diagnosis.explanations.candidates import candidates, hidden_pair
 from pipeline.diagnosis.explanations.conclusion import Conclusion, conclusion_of
 from pipeline.diagnosis.explanations.pair_fits import together
 from pipeline.diagnosis.explanations.search import searched
-from pipeline.diagnosis.explanations.single_cause import refit_one
+from pipeline.diagnosis.explanations.single_cause import Refits, known_refits
 from pipeline.diagnosis.fits.force_breaks import EXPLAINED, FAULT, force_break
 from pipeline.diagnosis.fits.outlier import joined_with_outlier, outlier_fault, worst_item
 from pipeline.diagnosis.fits.workbench import SCATTER, Workbench, prepare
@@ -66,15 +66,15 @@ def diagnose(
     bench = reason or prepare(faults, settings)
     if isinstance(bench, Message):
         return Diagnosed(_nothing_to_compare(bench), faults.findings, faults)
-    fault = _data_at_fault(bench)
+    fault, refitted = _data_at_fault(bench)
     if fault is not None:
         joined = joined_with_outlier(faults, fault)
         again = prepare(joined, settings)
         if not isinstance(again, Message) and again.largest <= again.limit:
-            faults, bench = joined, again
+            faults, bench, refitted = joined, again, {}
     fitted = None if identification is None else identification.inverse
     known = curve_of(fitted) if fitted is not None and fitted.converged else None
-    conclusion = conclude(bench)
+    conclusion = conclude(bench, refitted)
     beside = _beside(bench, conclusion)
     part = present(bench, conclusion, settings, identified=known, shown=beside.shown)
     part = part.model_copy(update={"corrected_forces": [_told(correction) for correction in faults.corrections]})
@@ -95,9 +95,9 @@ def _not_to_be_compared(faults: Faults, identification: Identification | None) -
     return None if faults.loaded_forces() else Message("diagnosis.no-force-used")
 
 
-def conclude(bench: Workbench) -> Conclusion:
-    """Refit the causes and pairs of causes that matter, and weigh them all."""
-    return conclusion_of(bench, searched(bench))
+def conclude(bench: Workbench, known: Refits | None = None) -> Conclusion:
+    """Refit the causes and pairs of causes that matter, ``known`` ones apart, and weigh them all."""
+    return conclusion_of(bench, searched(bench, known))
 
 
 class _Beside(NamedTuple):
@@ -146,26 +146,28 @@ def _stands_still(test: MeasuredTest) -> bool:
     return logged == {0.0} or (len(logged) == 1 and moved)
 
 
-def _data_at_fault(bench: Workbench) -> Faults | None:
-    """A break in the forces, or one item, that explains more than causes do; None below the threshold of the score."""
+def _data_at_fault(bench: Workbench) -> tuple[Faults | None, Refits]:
+    """A break in the forces, or one item, that explains more than causes do; and the causes refitted on the way.
+
+    None below the threshold of the score.
+    """
+    known: Refits = {}
     if bench.largest <= bench.limit:
-        return None
+        return None, known
     for sought in (force_break, _item_at_fault):
         found = sought(bench)
-        if found is not None and not _causes_leave(bench, found[1] + FAULT**2):
-            return found[0]
-    return None
+        if found is not None and not _causes_leave(bench, found[1] + FAULT**2, known):
+            return found[0], known
+    return None, known
 
 
-def _causes_leave(bench: Workbench, most: float) -> bool:
+def _causes_leave(bench: Workbench, most: float, known: Refits) -> bool:
     """Whether a cause or a pair of causes, refitted (scores are linear), leaves at most that chi-square."""
     suspicion = bench.suspicion
-    single = (
-        refit_one(bench.observation, bench.base, suspicion, cause, rival=most)
-        for cause in candidates(suspicion)[:REFITTED]
-    )
-    if any(one is not None and one.fitted.chi2 <= most for one in single):
-        return True
+    for cause in candidates(suspicion)[:REFITTED]:
+        found = known_refits(bench.observation, bench.base, suspicion, cause, known, rival=most)
+        if any(one.fitted.chi2 <= most for one in found):
+            return True
     hidden = hidden_pair(suspicion)
     return bool(hidden) and any(pair.fitted.chi2 <= most for pair in together(bench, hidden))
 

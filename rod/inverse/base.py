@@ -123,12 +123,14 @@ class Base:
         return (*self.axes, "scale")
 
     def axis_errors(self, vector: Array) -> Array:
-        """Errors (8,) of axes and camera in the order of `AXES`, m, relative and 1/m; the lean of the rig in them."""
-        first = self.law.size + (not self.straight)
-        errors = vector[first : first + len(AXES)].copy() if self.axes else np.zeros(len(AXES))
+        """Errors (..., 8) of axes and camera as in `AXES`, m, relative and 1/m; the lean of the rig in them."""
+        errors = np.zeros((*vector.shape[:-1], len(AXES)))
+        if self.axes:
+            first = self.law.size + (not self.straight)
+            errors += vector[..., first : first + len(AXES)]
         if self.rig_std:
-            errors[5:7] += vector[self.rig_at[3:]]
-        return np.asarray(errors)
+            errors[..., 5:7] += vector[..., self.rig_at[3:]]
+        return errors
 
     def beyond_log(self, facts: Facts, exact: float) -> NDArray[np.int_]:
         """Positions in the vector of errors of displacements that the log tells to ``exact`` (m) or better."""
@@ -236,11 +238,14 @@ class Base:
         return Model(bending, shift=self.shift(vector, steps)).observed(self.observer(vector))
 
     def observer(self, vector: Array) -> Observer:
-        """First observer of every model: camera with its scale, axes found on its photos, zero of the load cell."""
-        seen = [scaled(float(vector[len(self.names) - 2]))]
+        """First observer of every model: camera with its scale, axes found on its photos, zero of the load cell.
+
+        Of k vectors (k, p) it makes k variations of a prediction.
+        """
+        seen = [scaled(vector[..., len(self.names) - 2])]
         if self.axes or self.rig_std:
             seen.append(axes_off(self.axis_errors(vector)))
-        zero = float(vector[self.rig_at[1:2]].sum())
+        zero = vector[..., self.rig_at[1:2]].sum(axis=-1, keepdims=True)
 
         def observer(prediction: Prediction, facts: Facts) -> Prediction:
             for one in seen:

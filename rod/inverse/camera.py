@@ -57,17 +57,20 @@ def seen_through(move: Move) -> Observer:
     return observer
 
 
-def scaled(error: float) -> Observer:
-    """Observer whose stated px/mm is ``1 + error`` times the true one: all lengths and the chord shrink by that."""
-    factor = 1.0 / (1.0 + error)
+def scaled(error: Array | float) -> Observer:
+    """Observer whose stated px/mm is ``1 + error`` times the true one: all lengths and the chord shrink by that.
+
+    Of k errors (k,) it makes k variations of a prediction.
+    """
+    factor = 1.0 / (1.0 + np.asarray(error)[..., None])
 
     def observer(prediction: Prediction, facts: Facts) -> Prediction:
         return replace(
             prediction,
             chord=factor * prediction.chord,
             s=factor * prediction.s,
-            x=factor * prediction.x,
-            y=factor * prediction.y,
+            x=factor[..., None] * prediction.x,
+            y=factor[..., None] * prediction.y,
         )
 
     return observer
@@ -78,9 +81,9 @@ def axes_off(errors: Array) -> Observer:
 
     A fifth number is the part of their way from the centre of the picture by which both are seen farther out. The chord
     frame is laid through what is taken for the axes. Three more are what is left of tilt along and across the chord
-    (1/m) and of the lens's distortion.
+    (1/m) and of the lens's distortion. Of errors (k, 8) it makes k variations of a prediction.
     """
-    parallax, along, across, lens = errors[4:]
+    parallax, along, across, lens = np.moveaxis(errors[..., 4:], -1, 0)[..., None, None]
 
     def observer(prediction: Prediction, facts: Facts) -> Prediction:
         square = facts.half_diagonal**2
@@ -90,11 +93,11 @@ def axes_off(errors: Array) -> Observer:
             return x * grow, y * grow
 
         prediction = seen_through(move)(prediction, facts)
-        left = errors[:2] - parallax * facts.picture_centre
-        span = (1.0 + parallax) * prediction.chord + errors[2] - errors[0]
-        rise = errors[3] - errors[1]
+        left = errors[..., None, :2] - parallax * facts.picture_centre
+        apart, rise = np.moveaxis(errors[..., 2:4] - errors[..., :2], -1, 0)[..., None]
+        span = (1.0 + parallax[..., 0]) * prediction.chord + apart
         roll = np.arctan2(rise, span)[..., None]
-        rel_x, rel_y = prediction.x - left[:, :1], prediction.y - left[:, 1:]
+        rel_x, rel_y = prediction.x - left[..., :1], prediction.y - left[..., 1:]
         return replace(
             prediction,
             chord=np.hypot(span, rise),

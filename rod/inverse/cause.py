@@ -118,6 +118,8 @@ class Cause(ABC):
         1 if the amount cannot be negative, 0 if it can.
     combines : bool
         Whether several forms may act together (a profile along the cable is a sum of forms).
+    whole : bool
+        Whether the forms of a setting are components of one thing, of which none is there without the others.
     additive : bool
         Whether the amounts of forms acting together add up; else the largest is the size of the cause.
     limited : bool
@@ -130,6 +132,7 @@ class Cause(ABC):
     seat: ClassVar[str]
     sign: ClassVar[int] = 0
     combines: ClassVar[bool] = False
+    whole: ClassVar[bool] = False
     additive: ClassVar[bool] = False
     limited: ClassVar[bool] = False
 

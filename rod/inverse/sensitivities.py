@@ -59,22 +59,19 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
     bends, simulated = bending_numbers(extension, vector, base_model, here.model)
     by = combined(here, facts, bends)
     bent = observed(moved(here.bare, by, range(len(bends.at)), steps[bends.at]), here.model, facts)
-    shown: dict[int, Prediction] = {}
-    for j in range(len(vector)):
-        if j in bends.at or j in simulated:
-            continue
-        if j >= len(base.names):
-            steps[j] *= SHORT
-        trial = vector.copy()
-        trial[j] += steps[j]
-        if j < len(base.names):
-            observers = (base.observer(trial), *here.model.observers[1:])
-        else:
-            observers = plainly(extension, trial, base_model).observers
-        shown[j] = observed(here.bare, replace(here.model, observers=observers), facts)
+    seen = [j for j in range(len(vector)) if j not in bends.at and j not in simulated]
+    of_base, of_causes = ([j for j in seen if (j < len(base.names)) == own] for own in (True, False))
+    steps[of_causes] *= SHORT
+    trials = vector + np.diag(steps)
+    every = (base.observer(trials[of_base]), *here.model.observers[1:])
+    same = Prediction.varied([here.bare] * len(of_base))
+    ways = [(bends.at, bent), (of_base, observed(same, replace(here.model, observers=every), facts))]
+    if of_causes:
+        models = (plainly(extension, trials[j], base_model) for j in of_causes)
+        ways.append((of_causes, Prediction.varied([observed(here.bare, model, facts) for model in models])))
     count, prior = observation.rows.count, extension.prior
     table = np.zeros((count + len(prior), len(vector)))
-    for at, there in ((bends.at, bent), (list(shown), Prediction.varied(list(shown.values())))):
+    for at, there in ways:
         table[:count, at] = columns_of(observation, here.prediction, there, steps[at])
     table[count:] = prior
     for j in simulated:

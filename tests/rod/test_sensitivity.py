@@ -80,6 +80,8 @@ VARIATIONS: dict[str, tuple[Vary, float]] = {
     "bearing_stiffness": (lambda t, h: both({"stiffness": h}, t, h), 3e-6),
     "bearing_stiffness_left": (one("left", "stiffness"), 3e-6),
     "bearing_stiffness_right": (one("right", "stiffness"), 3e-6),
+    "bearing_hardening_left": (one("left", "hardening"), 3e-6),
+    "bearing_hardening_right": (one("right", "hardening"), 3e-6),
     "bearing_friction": (lambda t, h: both({"friction_moment": h}, t, h), 3e-6),
     "bearing_friction_left": (one("left", "friction_moment"), 3e-6),
     "bearing_friction_right": (one("right", "friction_moment"), 3e-6),
@@ -190,11 +192,12 @@ def test_clamps_follow_their_angle(side: str) -> None:
     assert worst_error(test, turning, vary, 1e-4, lambda t, s: simulate(t, chords=[0.19, 0.18])) < 1e-6
 
 
+@pytest.mark.parametrize("name", ["angle", "stiffness", "hardening"])
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_springs_follow_their_rest_angle(side: str) -> None:
-    test = replace(EVERYTHING, **{side: replace(getattr(EVERYTHING, side), angle=0.3)})
-    vary = one(side, "angle")
-    assert worst_error(test, Toward(test, vary(test, 1e-4), 1e-4), vary, 1e-4, displaced) < 1e-6
+def test_springs_follow_their_numbers(side: str, name: str) -> None:
+    test = replace(EVERYTHING, **{side: Support(stiffness=2e-3, hardening=5e-3, angle=0.3)}, friction=None)
+    vary, h = one(side, name), 1e-4 if name == "angle" else 3e-6
+    assert worst_error(test, Toward(test, vary(test, h), h), vary, h, displaced) < 1e-6
 
 
 def test_clamp_as_mounted_turns_with_the_pre_curvature() -> None:

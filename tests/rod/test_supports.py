@@ -55,7 +55,8 @@ def reference(test: BendingTest, guess, *, chord=None, force=None, tip=None, tur
         return np.array([np.cos(theta), np.sin(theta), -K, fy * np.cos(theta) - fx * np.sin(theta)])
 
     def turning(support, angle, at_rest, direction):
-        return support.stiffness * (angle - at_rest) + support.friction_moment * direction
+        turn = angle - at_rest
+        return support.stiffness * turn + support.hardening * turn**3 + support.friction_moment * direction
 
     def ends(first, last, R):
         # The rigid pieces are straight: their lever arms and loads are closed forms.
@@ -115,6 +116,9 @@ BEARINGS = {
     "pre-curvature along s": replace(BASE, pre_curvature=lambda xi: 2.0 + 1.5 * xi + np.cos(2 * np.pi * xi)),
     "soft spot": replace(BASE, stiffness_profile=lambda xi: 1.0 - 0.4 * np.exp(-(((xi - 0.4) / 0.1) ** 2))),
     "springs": replace(BASE, left=Support(stiffness=0.02), right=Support(stiffness=0.05)),
+    "springs that stiffen": replace(
+        BASE, left=Support(stiffness=0.02, hardening=0.1), right=Support(stiffness=0.05, hardening=-0.02)
+    ),
     "spring with rest angle": replace(BASE, left=Support(stiffness=0.02, angle=0.6)),
     "Coulomb moments": replace(BASE, left=Support(friction_moment=1e-3), right=Support(friction_moment=2e-3)),
     "rigid ends": replace(BASE, left=Support(rigid_length=0.01), right=Support(rigid_length=0.016)),

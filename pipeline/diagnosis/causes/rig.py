@@ -120,12 +120,18 @@ class BearingStiffness(Cause):
         return 0.05 * facts.moment_scale / facts.curvature_scale / facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both bearings alike, or one."""
-        return (Variant(), *(Variant(side, rare=True) for side in SIDES))
+        """Both bearings alike, or one; a seal stiffens with its turn (1 + ``width`` turn^2)."""
+        stiffening = Variant("that stiffens with the turn", width=1.0, tuned=("width",), width_range=(0.0, 10.0))
+        return (Variant(), stiffening, *(Variant(side, rare=True) for side in SIDES))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Give the bearings the spring ``amount``."""
-        return _at_bearings(model, variant, lambda end: replace(end, stiffness=end.stiffness + amount))
+        """Give the bearings the spring ``amount``, at rest."""
+
+        def stiffer(end: Support) -> Support:
+            hardening = end.hardening + amount * variant.width
+            return replace(end, stiffness=end.stiffness + amount, hardening=hardening)
+
+        return _at_bearings(model, variant, stiffer)
 
 
 class RigidEnds(Cause):
@@ -225,6 +231,7 @@ class InPlaneLoad(Cause):
     name = "in_plane_load"
     unit = "N/m"
     combines = True
+    whole = True
     seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
@@ -232,7 +239,7 @@ class InPlaneLoad(Cause):
         return 0.02 * facts.force_scale / facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Along and across the chord (a load at an angle is a sum of both), with either zero of the displacement.
+        """Along and across the chord, the components of a load in any direction, with either zero of the displacement.
 
         Displacement counts from the chord of the mounted cable, which was measured under the load or without it.
         """

@@ -58,6 +58,8 @@ def with_more_forms(
     """
     if cause.additive:
         return in_all_forms(observation, fitted, cause, setting)
+    if cause.whole:
+        return _with_all_components(observation, fitted, cause, setting)
     while len(fitted.extension.terms_of(cause)) < SHAPES_MOST:
         least = max(SHAPE_GAIN, LEAST_SHARE * fitted.chi2)
         more = suspect(observation, fitted, [cause])
@@ -77,6 +79,17 @@ def with_more_forms(
             break
         fitted = without_needless_forms(observation, added, cause)
     return fitted
+
+
+def _with_all_components(observation: Observation, fitted: Fit, cause: Cause, setting: str) -> Fit:
+    """Fit the components of one thing that are not in the model yet as well, from nothing."""
+    known = fitted.extension
+    present = {known.terms[k].variant.label for k in known.terms_of(cause)}
+    forms = (form for form in cause.variants(known.facts) if form.setting == setting)
+    added = tuple(Term(cause, form) for form in forms if form.label not in present)
+    extension = replace(known, terms=(*known.terms, *added))
+    found = fit_from(observation, extension, np.r_[fitted.vector, np.zeros(len(added))], fitted)
+    return fitted if found.run.prediction is None else found
 
 
 def in_all_forms(observation: Observation, fitted: Fit, cause: Cause, setting: str) -> Fit:

@@ -23,7 +23,7 @@ from pipeline.diagnosis.explanations.candidates import LEAST, candidates, hidden
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
-from pipeline.diagnosis.explanations.single_cause import ALSO, refits
+from pipeline.diagnosis.explanations.single_cause import ALSO, Refits, known_refits
 from pipeline.diagnosis.fits.search import Suspicion, beside_rig, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
@@ -49,8 +49,8 @@ Forms = tuple[int, frozenset[str]]
 class Search:
     """Hypotheses about one specimen as they are found, and their probabilities."""
 
-    def __init__(self, bench: Workbench) -> None:
-        self.bench = bench
+    def __init__(self, bench: Workbench, known: Refits | None = None) -> None:
+        self.bench, self.known = bench, known or {}
         self.grid: ErrorGrid = error_grid(bench.observation, bench.facts)
         self._about: dict[Explanation, Suspicion] = {}
         self._beside: dict[Explanation, Weighed] = {}
@@ -90,14 +90,13 @@ class Search:
         return found
 
     def _each(self, causes: Sequence[int]) -> Iterator[Explanation]:
-        rival = np.inf
-        for cause in causes:
-            if not self.bench.suspicion.of(cause).size:
-                continue
-            for one in refits(self.bench.observation, self.bench.base, self.bench.suspicion, cause, rival=rival):
+        bench = self.bench
+        rival = min((one.fitted.chi2 for _, found in self.known.values() for one in found), default=np.inf)
+        for cause in (cause for cause in causes if bench.suspicion.of(cause).size):
+            for one in known_refits(bench.observation, bench.base, bench.suspicion, cause, self.known, rival=rival):
                 if one.gain > 0.0:
                     rival = min(rival, one.fitted.chi2)
-                    yield from (one, *by_step(self.bench, one))
+                    yield from (one, *by_step(bench, one))
 
     def likeliest(self) -> list[Explanation]:
         """The likeliest single causes, and what is nearly as likely as the first one in another form of it."""
@@ -226,9 +225,9 @@ class Search:
         return believed.total(count=2) + believed.total(something_else=True) > beforehand
 
 
-def searched(bench: Workbench) -> Search:
-    """All hypotheses about a specimen that are worth it, weighed."""
-    search = Search(bench)
+def searched(bench: Workbench, known: Refits | None = None) -> Search:
+    """All hypotheses about a specimen that are worth it, weighed; ``known`` causes are not refitted again."""
+    search = Search(bench, known)
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
     silent = silent and first.word == "base"

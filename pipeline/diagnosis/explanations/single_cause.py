@@ -46,6 +46,8 @@ def refits(
         if kind.combines:
             for (setting, *_), one in [*best.items()]:
                 best[setting,] = with_more_forms(observation, one, kind, setting, hopeless=rival + LEAST)
+                # one component alone is there for the evidence to choose
+                best |= {(setting, "alone"): one} if kind.whole else {}
         # half a cost is minus the logarithm of a likelihood
         enough = min(map(cost, best.values()), default=np.inf) - 2.0 * np.log(ALSO)
         found = [one for one in best.values() if cost(one) < enough]
@@ -57,12 +59,17 @@ def refits(
     return [explanation_of((cause,), base, one) for one in found]
 
 
-def refit_one(
-    observation: Observation, base: Fit, suspicion: Suspicion, cause: int, *, rival: float = np.inf
-) -> Explanation | None:
-    """The cheapest of `refits`."""
-    found = refits(observation, base, suspicion, cause, rival=rival)
-    return min(found, key=lambda one: cost(one.fitted), default=None)
+Refits = dict[int, tuple[float, list[Explanation]]]
+"""Causes that were refitted already: the rival each had, and what was found."""
+
+
+def known_refits(
+    observation: Observation, base: Fit, suspicion: Suspicion, cause: int, known: Refits, *, rival: float
+) -> list[Explanation]:
+    """`refits`, unless ``known`` has them with a rival no better; they are put there."""
+    if cause not in known or known[cause][0] < rival:
+        known[cause] = rival, refits(observation, base, suspicion, cause, rival=rival)
+    return known[cause][1]
 
 
 def _strong_profile(observation: Observation, base: Fit, suspicion: Suspicion, cause: int) -> Fit | None:

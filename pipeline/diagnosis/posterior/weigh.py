@@ -14,6 +14,7 @@ from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence, evidences
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
+from rod.inverse.extension import Extension
 from rod.inverse.fit import Fit
 from rod.inverse.prediction import Facts
 
@@ -64,8 +65,11 @@ def _of_causes(suspicion: Suspicion, found_of: list[tuple[Evidence, WithColumn]]
 def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:
     """The hypothesis of a refit, its forms one choice of many each; what begins between two holds is something else."""
     own = evidence(grid, found.fitted)[0]
-    terms = (term for term in found.fitted.extension.terms if not np.isfinite(term.variant.known))
-    tried = sum(_kinds(term.cause, facts) for term in terms)
+    extension = found.fitted.extension
+    terms = (term for term in extension.terms if not np.isfinite(term.variant.known))
+    # all components of one thing are one choice
+    chosen = dict.fromkeys((term.cause, _whole(term.cause, extension) or term) for term in terms)
+    tried = sum(_kinds(cause, facts, whole=form is True) for cause, form in chosen)
     if found.begun:
         return Hypothesis(found.causes, -np.inf, own.plain - tried + float(np.log(BEGINS / len(BEGUN))), found)
     return Hypothesis(found.causes, own.plain - tried, own.rest - tried, found)
@@ -75,6 +79,12 @@ BEGINS = 0.25
 """Of the probability of something else beforehand: what begins between two holds."""
 
 
-def _kinds(cause: Cause, facts: Facts) -> float:
-    """Log of the number of forms of a cause that differ by more than a place."""
-    return float(np.log(max(len({(form.label, form.setting) for form in cause.variants(facts)}), 1)))
+def _whole(cause: Cause, extension: Extension) -> bool:
+    """Whether all components of a cause that is one thing are in a model."""
+    return cause.whole and len(extension.terms_of(cause)) > 1
+
+
+def _kinds(cause: Cause, facts: Facts, *, whole: bool) -> float:
+    """Log of the number of forms of a cause that differ by more than a place; ``whole``: all components are one."""
+    labels = {("" if whole else form.label, form.setting) for form in cause.variants(facts)}
+    return float(np.log(max(len(labels), 1)))

@@ -9,11 +9,11 @@ import pytest
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.memory import Slipping
+from fixtures.scores import refit_one
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.explanations import refit
 from pipeline.diagnosis.explanations.forms import may_join
 from pipeline.diagnosis.explanations.refit import Addition, linear_start
-from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.presentation.findings import too_large

@@ -5,11 +5,11 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, SIX, THREE, hidden_test
+from fixtures.scores import refit_one
 from fixtures.trials import f_error
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.profile import deviation, forms, largest_of, position_of, profile, wave
-from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve, visited
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.workbench import prepare

@@ -7,8 +7,8 @@ from fixtures.continuum import Cable
 from fixtures.effects import SPOT, Form, profile
 from fixtures.hidden import LOOP, SIX, Protocol, Reading, hidden_test
 from fixtures.memory import BoucWen, Slipping
+from fixtures.scores import refit_one
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.workbench import prepare

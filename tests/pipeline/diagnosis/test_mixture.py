@@ -12,10 +12,10 @@ from fixtures.aliens import with_alien
 from fixtures.continuum import Cable
 from fixtures.effects import LARGEST, PROTOCOLS
 from fixtures.hidden import hidden_test
+from fixtures.scores import refit_one
 from fixtures.trials import alien_size
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.diagnosis.causes.load_cell import ForceGain
-from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.extended import curve as curve_of
 from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.workbench import prepare

@@ -6,9 +6,8 @@ import pytest
 
 from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
 from fixtures.hidden import hidden_test
-from fixtures.scores import SETTINGS
+from fixtures.scores import SETTINGS, refit_one
 from pipeline.diagnosis.causes import SUSPECTS
-from pipeline.diagnosis.explanations.single_cause import refit_one
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.plans.next_experiment import BETTER, next_experiment, protocols
 from pipeline.faults import faults_of_input
