@@ -29,6 +29,7 @@ do. A gap is written as in `str.format`; what may stand behind its colon:
 from __future__ import annotations
 
 import errno
+import math
 import string
 import tomllib
 import unicodedata
@@ -46,7 +47,7 @@ LONGEST = 600
 """Letters of a text that is quoted from a file: a line may have a million. What is cut is its middle."""
 DECIMAL = {"en": ".", "de": ","}
 PER = {"en": " per ", "de": " je "}
-FACTORS = {"mm": 1e3, "µm": 1e6, "%": 1e2, "mN m²": 1e3, "1/m": 1.0, "N": 1.0, "": 1.0}
+FACTORS = {"mm": 1e3, "µm": 1e6, "%": 1e2, "mN m²": 1e3, "°": 180.0 / math.pi, "1/m": 1.0, "N": 1.0, "": 1.0}
 QUANTITIES = ("N", "N m²")
 UNREADABLE = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 """What `Message.read` raises on values that do not fit: those of another version, or changed by somebody."""

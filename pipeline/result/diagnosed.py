@@ -63,14 +63,18 @@ class CausePart(Part):
         return self.size or (self.estimate, self.std, self.unit)
 
     def in_what_form(self, language: str) -> list[str]:
-        """The forms that the cause has in the extended model, in words; with figures where these were fitted."""
-        known = catalogue("en")
-        said = []
+        """The forms that the cause has in the extended model, in words; with figures where these were fitted.
+
+        Each with its amount where none has a place and they make up nothing else: the components of a load.
+        """
+        known, said = catalogue("en"), []
+        apart = len(self.forms) > 1 and self.size is None and not any(form.tuned for form in self.forms)
         for form in self.forms:
             message = Message(f"form.{self.name}.{form.label}", at=form.at, width=form.width)
             if message.key in known:
                 parts = message.parts(language)  # the more was fitted, the more is told
-                said.append(parts[min(len(form.tuned), len(parts) - 1)])
+                amount = Message("form.of-amount", amount=(form.amount, form.std, self.unit)).said(language)
+                said.append(parts[min(len(form.tuned), len(parts) - 1)] + (amount if apart else ""))
         return list(dict.fromkeys(said))
 
 

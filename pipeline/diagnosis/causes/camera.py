@@ -91,24 +91,24 @@ class CameraTilt(Cause):
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """Perspective alone, along and across the chord; steep in any direction, with the signed D^2 as ``width``, m^2.
 
-        ``at`` is the direction, in right angles from the chord toward the bow.
+        ``at`` is the direction, in rad from the chord toward the bow.
         """
         square = facts.length**2
         steep = Variant(
             "steep enough to shorten the picture",
             width=USUAL**2 * square,
             tuned=("at", "width"),
-            at_range=(-1.5, 1.5),
+            at_range=(-0.75 * np.pi, 0.75 * np.pi),
             width_range=(-(FAR**2) * square, FAR**2 * square),
             setting="steep",
         )
         return (
             Variant("along the chord", at=0.0),
-            Variant("across the chord", at=1.0),
+            Variant("across the chord", at=0.5 * np.pi),
             # what grows with the square of the tilt does not change its sign, so no trace tells of the others
             *(
                 replace(steep, at=at, width=way * steep.width, trace=trace)
-                for at in (0.0, 0.5, 1.0, -0.5)
+                for at in (0.0, 0.25 * np.pi, 0.5 * np.pi, -0.25 * np.pi)
                 for way in (1.0, -1.0)
                 for trace in (STEEP, -STEEP)
             ),
@@ -117,7 +117,7 @@ class CameraTilt(Cause):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """The scale falls by ``amount`` per metre in a direction, and lengths with the square of the tilt."""
         sine = float(np.clip(amount * np.sqrt(abs(variant.width)), -STEEPEST, STEEPEST))
-        flat, (cosine, turned) = np.sqrt(1.0 - sine**2), (fn(0.5 * np.pi * variant.at) for fn in (np.cos, np.sin))
+        flat, (cosine, turned) = np.sqrt(1.0 - sine**2), (fn(variant.at) for fn in (np.cos, np.sin))
         own, other = (flat, 1.0) if variant.width >= 0.0 else (flat**-2, 1.0 / flat)
 
         def move(x: Array, y: Array) -> tuple[Array, Array]:

@@ -211,7 +211,7 @@ def test_a_tilt_in_any_direction_is_a_turn_before_a_pinhole(bench, sines, way, t
     distance, cause = 0.4, BY_NAME["camera_tilt"]
     form = next(form for form in cause.variants(facts) if "width" in form.tuned)
     form = replace(form, width=distance**2 * (1.0 if way == "foreshortened" else -1.0))
-    form = replace(form, at=np.arctan2(sines[1], sines[0]) / (0.5 * np.pi))
+    form = replace(form, at=np.arctan2(sines[1], sines[0]))
     model = cause.apply(model, np.hypot(*sines) / distance, form, facts)
     seen = run(model, facts).prediction
     axis = np.array([sines[1], -sines[0], 0.0])
