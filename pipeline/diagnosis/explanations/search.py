@@ -1,7 +1,7 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what begins between two holds, beside the likeliest four -> what is likely beside these -> causes exchanged while a
+-> what has no name, beside the likeliest four -> what is likely beside these -> causes exchanged while a
 pair that shares one with the likeliest is likelier -> pairs pruned of what they do not need -> where something else is
 likelier still, the nearest cause with all others -> probabilities of all.
 
@@ -14,11 +14,12 @@ standard deviations of zero is fitted again without it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.begun import BEGUN
+from pipeline.diagnosis.causes.unnamed import BEGUN, MOMENTS
 from pipeline.diagnosis.explanations.candidates import LEAST, candidates, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
@@ -31,7 +32,7 @@ from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import Weighed, refitted, weighed
 from rod.inverse.base_fit import settled
-from rod.inverse.fit import FITS, fit_from
+from rod.inverse.fit import FITS, Fit, fit_from
 
 MATTERS = 0.1
 """Probability of a cause by the linear model from which causes are refitted at all: small effects are linear ones."""
@@ -136,7 +137,7 @@ class Search:
         # before something is called unexplained, every other cause is tried in its place beside the nearest one
         if believed.word == "rest":
             alone = (one.found for one in believed.beside_something_else() if len(one.causes) == 1)
-            best = next((one for one in alone if one is not None and not one.begun), singles[0])
+            best = next((one for one in alone if one is not None and not one.unnamed), singles[0])
             second = self.beside(best)
             every = candidates(second, margin=1.0, most=len(second.causes))
             others = [cause for cause in every if not any({*best.causes, cause} == {*pair.causes} for pair in found)]
@@ -199,8 +200,8 @@ class Search:
                 reached[left] = min(rest.fitted.chi2, reached.get(left, np.inf))
                 yield rest
 
-    def begun(self) -> None:
-        """What begins between two holds, beside the base model and the likeliest causes: it is something else."""
+    def unnamed(self) -> None:
+        """What has no name in the catalogue: moments beside the base model, what begins beside the likeliest causes."""
         base, bench = explanation_of((), self.bench.base, self.bench.base), self.bench
         known = [base, *(found.found for found in self.posterior.explanations()[:LIKELIEST] if found.found)]
         hopeless = min(one.fitted.chi2 for one in known) + LEAST
@@ -210,8 +211,16 @@ class Search:
             least = max(SHAPE_GAIN, one.fitted.chi2 - hopeless)
             since = [k for k in loud if k is not None and about.statistic[k] ** 2 > least]
             fits = (fit_term(bench.observation, one.fitted, about, k, hopeless=hopeless) for k in since)
-            found = (explanation_of(one.causes, bench.base, fitted) for fitted in fits if fitted is not None)
-            self.hypotheses += [refitted(self.grid.plain, explanation, bench.facts) for explanation in found]
+            self._weigh_unnamed(one.causes, fits)
+        extension, vector = bench.base.extension, bench.base.vector
+        models = (replace(extension, terms=terms) for terms in MOMENTS.ways(bench.facts))
+        starts = ((model, np.append(vector, np.zeros(len(model.terms)))) for model in models)
+        self._weigh_unnamed((), (fit_from(bench.observation, *start, bench.base) for start in starts))
+
+    def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> None:
+        seen = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)
+        found = (explanation_of(causes, self.bench.base, fitted) for fitted in seen)
+        self.hypotheses += [refitted(self.grid.plain, one, self.bench.facts) for one in found]
 
     def pairs_speak(self, best: Explanation) -> bool:
         """Whether the data make, or may make, two causes or something else likelier than they were beforehand."""
@@ -238,7 +247,7 @@ def searched(bench: Workbench, known: Refits | None = None) -> Search:
     if silent and fits and not hidden:
         return search
     search.singles()
-    search.begun()
+    search.unnamed()
     singles = search.likeliest()
     # beside a base model that stays the likeliest no pair is sought, unless two causes hide each other
     if singles and (hidden or (search.posterior.word != "base" and search.pairs_speak(singles[0]))):

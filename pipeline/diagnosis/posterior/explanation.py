@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.profile import largest, largest_of
+from pipeline.diagnosis.causes.unnamed import UNNAMED
 from rod.inverse.cause import Profile, Variant
 from rod.inverse.fit import Fit
 
@@ -34,9 +34,9 @@ class Explanation:
     gain: float
 
     @property
-    def begun(self) -> bool:
-        """Whether it holds what begins between two holds, which is no cause of the catalogue."""
-        return any(term.cause in BEGUN for term in self.fitted.extension.terms)
+    def unnamed(self) -> bool:
+        """Whether it holds what acts on the cable and is no cause of the catalogue."""
+        return any(term.cause in UNNAMED for term in self.fitted.extension.terms)
 
     @property
     def worth(self) -> float:

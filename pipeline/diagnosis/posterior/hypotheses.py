@@ -9,9 +9,9 @@
     two causes and something else   0.01
 
 The probability of each is that share times its evidence (`evidence`): at its own refit where it has one, else by the
-linear model about the base, the mean over the forms of the cause. What begins between two holds (`causes.begun`) is
-something else that is refitted. Ten times another share changes few words: with base 0.8 three more real effects of 59
-stay silent, with 0.3 three nulls of 36 get a name.
+linear model about the base, the mean over the forms of the cause. What acts on the cable and has no name
+(`causes.unnamed`) is something else that is refitted. Ten times another share changes few words: with base 0.8 three
+more real effects of 59 stay silent, with 0.3 three nulls of 36 get a name.
 
 What is said is the likeliest of three: the base model, causes of the catalogue, or something else. Among causes the
 smallest set that holds 95 % of their probability cannot be told apart.

@@ -113,7 +113,7 @@ def _refits(
         fitted = one.found.fitted if one.found else base
         if one.probability > NEGLIGIBLE and (one.found or one.something_else or not one.causes):
             chance = chances.setdefault(id(fitted), (fitted, {}))[1]
-            disturbed = one.something_else and not (one.found and one.found.begun)
+            disturbed = one.something_else and not (one.found and one.found.unnamed)
             chance[disturbed] = chance.get(disturbed, 0.0) + one.probability
     for own, (fitted, chance) in chances.items():
         fitted = again.get(own, fitted)

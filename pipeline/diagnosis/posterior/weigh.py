@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
-from pipeline.diagnosis.causes.begun import BEGUN
+from pipeline.diagnosis.causes.unnamed import UNNAMED
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence, evidences
@@ -63,20 +63,18 @@ def _of_causes(suspicion: Suspicion, found_of: list[tuple[Evidence, WithColumn]]
 
 
 def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:
-    """The hypothesis of a refit, its forms one choice of many each; what begins between two holds is something else."""
+    """The hypothesis of a refit, its forms one choice of many each; what has no name is something else."""
     own = evidence(grid, found.fitted)[0]
     extension = found.fitted.extension
-    terms = (term for term in extension.terms if not np.isfinite(term.variant.known))
+    unnamed = {cause for cause in UNNAMED if extension.terms_of(cause)}
+    terms = (term for term in extension.terms if term.cause not in unnamed and not np.isfinite(term.variant.known))
     # all components of one thing are one choice
     chosen = dict.fromkeys((term.cause, _whole(term.cause, extension) or term) for term in terms)
     tried = sum(_kinds(cause, facts, whole=form is True) for cause, form in chosen)
-    if found.begun:
-        return Hypothesis(found.causes, -np.inf, own.plain - tried + float(np.log(BEGINS / len(BEGUN))), found)
+    if unnamed:
+        chances = sum(float(np.log(cause.chance(facts))) for cause in unnamed)
+        return Hypothesis(found.causes, -np.inf, own.plain - tried + chances, found)
     return Hypothesis(found.causes, own.plain - tried, own.rest - tried, found)
-
-
-BEGINS = 0.25
-"""Of the probability of something else beforehand: what begins between two holds."""
 
 
 def _whole(cause: Cause, extension: Extension) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.diagnosis.causes.begun import BEGUN
+import numpy as np
+
+from pipeline.diagnosis.causes.unnamed import BEGUN, MOMENTS, PLACES
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.maps import whereabouts
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -16,14 +18,14 @@ def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
     """Say where in the data that is which is likeliest to be something else."""
     observation, fitted = bench.observation, conclusion.fitted(bench)
     field, astray = something_else(conclusion.grid, fitted)
-    begun = _begun(bench, fitted)
+    unnamed = _unnamed(bench, fitted)
     found = whereabouts(observation, field)
     step = bench.test.steps[found.step]
     loudest = max(found.share, key=lambda kind: found.share[kind])
     placed = found.place is not None and loudest == "shape"
     place = Message("left.place", at_m=found.place) if placed else ""
-    said = begun or Message("left.over", where=f"{loudest}s", step=step.step, branch=step.branch, place=place)
-    if astray and not begun:
+    said = unnamed or Message("left.over", where=f"{loudest}s", step=step.step, branch=step.branch, place=place)
+    if astray and not unnamed:
         said = Message("left.astray", size_m=astray, step=step.step, branch=step.branch)
     return LeftoverPart(
         **LeftoverPart.told(said),
@@ -38,12 +40,43 @@ def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
     )
 
 
-def _begun(bench: Workbench, fitted: Fit) -> Message | None:
-    """What begins between two holds, if that is in the model."""
+def _unnamed(bench: Workbench, fitted: Fit) -> Message | None:
+    """What acts on the cable and has no name in the catalogue, if that is in the model."""
     for k, term in enumerate(fitted.extension.terms):
+        if term.cause is MOMENTS:
+            return _moments(bench, fitted)
         if term.cause in BEGUN:
-            step, (amount, std) = bench.test.steps[int(term.variant.at)], fitted.amount(k)
+            step, size = bench.test.steps[int(term.variant.at)], (*fitted.amount(k), term.cause.unit)
             more = Message("begun.growing") if term.variant.width else ""
-            size = (amount, std, term.cause.unit)
             return Message(term.cause.name, step=step.step, branch=step.branch, size=size, more=more)
     return None
+
+
+def _moments(bench: Workbench, fitted: Fit) -> Message:
+    """Where moments act that no model has, since which step they are seen, and when they are largest."""
+    extension, own = fitted.extension, fitted.extension.terms_of(MOMENTS)
+    forms, at = [extension.terms[k].variant for k in own], [extension.amounts_at[k] for k in own]
+    unit, rows = MOMENTS.together(forms, bench.facts)
+    size, std = (
+        rows @ fitted.vector[at],
+        np.sqrt(np.einsum("ij,jk,ik->i", rows, fitted.covariance[np.ix_(at, at)], rows)),
+    )
+    beyond = (np.abs(size) - SEEN * std).reshape(-1, len(bench.test.steps))
+    loudest, steps = int(np.argmax(beyond)), bench.test.steps
+    first = int(np.argmax((beyond > 0.0).any(axis=0)))
+    step, place = (
+        steps[loudest % len(steps)],
+        next(p for p, some in PLACES.items() if {*some} == {f.label for f in forms}),
+    )
+    return Message(
+        MOMENTS.name,
+        place=Message(f"unnamed.{place}"),
+        since=Message("unnamed.since", step=steps[first].step) if first > bench.facts.pushed[0] else "",
+        step=step.step,
+        branch=step.branch,
+        size=(float(size[loudest]), float(std[loudest]), unit),
+    )
+
+
+SEEN = 3.0
+"""Standard deviations beyond which such a moment is seen at a step."""

@@ -36,6 +36,9 @@ from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.fit import Fit
 
+BY_CHANCE = ("left.astray", "begun.rest", "begun.stiffness")
+"""What is left over that may have come by chance, and need not come again."""
+
 
 def present(
     bench: Workbench,
@@ -62,7 +65,7 @@ def present(
         ]
         errors += _begun_unseen(accepted.fitted)
         again = identified_again(bench.observation, shown or accepted.fitted, force_errors=errors)
-        if conclusion.unmodelled and not accepted.begun:
+        if conclusion.unmodelled and not accepted.unnamed:
             # the nearest cause may not be there at all: without it the data have another answer
             again = replace(again, other=bench.base)
     extended = None if again is None else extended_curve(again, settings)
@@ -95,7 +98,7 @@ def present(
     photos, forces = left_out(bench)
     before = bench.base if shown is None or accepted else shown
     spots = blind_spots(bench, seen, settings)
-    by_chance = leftover.key == "left.astray" or (accepted is not None and accepted.begun)
+    by_chance = leftover.key in BY_CHANCE
     return DiagnosisPart(
         verdict=word,
         **DiagnosisPart.told(sentence),

@@ -21,7 +21,8 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.vision.bearings.covers import find_rim
-from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, SURE_RIM, Circle, Radius
+from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, Circle, Radius
+from pipeline.vision.bearings.rings import is_sure
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
@@ -108,12 +109,12 @@ class _LostEnd:
         return float(np.hypot(*(np.array(circle.center) - self.end.place)) / circle.radius)
 
     def near(self, radius: float) -> Circle | None:
-        """Circle of about some radius that is seen nearly all round."""
+        """Circle of about some radius that is a cover for sure."""
         expected = Radius(radius, 0.5 * SEARCH_RADII)
         circle = find_rim(self.photo, self.end, expected, self.width_px)
-        if circle is None or circle.rim < SURE_RIM:
+        if circle is None or circle.radius_std > SAME_RADIUS * circle.radius:
             return None
-        return circle if circle.radius_std <= SAME_RADIUS * circle.radius else None
+        return circle if is_sure(self.photo, circle, circle.radius) else None
 
     def sizes(self) -> Array:
         """Radii tried."""
