@@ -66,7 +66,8 @@ def diagnose(
     bench = reason or prepare(faults, settings)
     if isinstance(bench, Message):
         return Diagnosed(_nothing_to_compare(bench), faults.findings, faults)
-    fault, refitted = _data_at_fault(bench)
+    refitted: Refits = {}
+    fault = _data_at_fault(bench, refitted)
     if fault is not None:
         joined = joined_with_outlier(faults, fault)
         again = prepare(joined, settings)
@@ -146,19 +147,18 @@ def _stands_still(test: MeasuredTest) -> bool:
     return logged == {0.0} or (len(logged) == 1 and moved)
 
 
-def _data_at_fault(bench: Workbench) -> tuple[Faults | None, Refits]:
-    """A break in the forces, or one item, that explains more than causes do; and the causes refitted on the way.
+def _data_at_fault(bench: Workbench, known: Refits) -> Faults | None:
+    """A break in the forces, or one item, that explains more than causes do; None below the threshold of the score.
 
-    None below the threshold of the score.
+    Causes that are refitted on the way are put into ``known``.
     """
-    known: Refits = {}
     if bench.largest <= bench.limit:
-        return None, known
+        return None
     for sought in (force_break, _item_at_fault):
         found = sought(bench)
         if found is not None and not _causes_leave(bench, found[1] + FAULT**2, known):
-            return found[0], known
-    return None, known
+            return found[0]
+    return None
 
 
 def _causes_leave(bench: Workbench, most: float, known: Refits) -> bool:

@@ -35,7 +35,7 @@ def spoiled(test, change):
 
 
 def fault(test, causes=SUSPECTS):
-    return _data_at_fault(prepare(faults_of_input(test), SETTINGS, causes=causes))
+    return _data_at_fault(prepare(faults_of_input(test), SETTINGS, causes=causes), {})
 
 
 @pytest.mark.parametrize("protocol", ["six", "loop"])
