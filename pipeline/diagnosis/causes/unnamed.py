@@ -10,7 +10,8 @@ And forces may act that no model has, with moments that come and go over the ste
 normal about nothing, of a standard deviation that falls with 1 / (1 + o):
 
 moments         at one bearing or both (a stop, a cable that is led in), falling to nothing at the other; or along the
-                cable (a pad, a magnet, a tether), as sines of one and two half waves
+                cable (a pad, a magnet, a tether): loads of one to four half waves, as likely each, have moments
+                M'' = q that fall with the square of their number
 
 A moment M at a place bends the cable there as a rest that is moved by M / f_EI does: force and shape are the same. So
 they are told as that curvature, 1/m.
@@ -23,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +112,8 @@ class OtherMoments(Cause):
         for forms in PLACES.values():
             for size in SIZES:
                 orders = range(len(facts.pushed))
-                every = (Variant(form, at=float(o), known=size / (1 + o)) for o in orders for form in forms)
+                known = {(form, o): size * MOST[form] / (1 + o) for o in orders for form in forms}
+                every = (Variant(form, at=float(o), known=std) for (form, o), std in known.items())
                 yield tuple(Term(self, variant) for variant in every)
 
     @staticmethod
@@ -131,21 +134,19 @@ class OtherMoments(Cause):
         return self.unit, np.concatenate(np.array(rows).swapaxes(1, 2))
 
 
-FORMS: dict[str, Callable[[Array], Array]] = {
-    "left": lambda u: 1.0 - u,
-    "right": lambda u: u,
-    "half wave": lambda u: np.sin(np.pi * u),
-    "wave": lambda u: np.sin(2.0 * np.pi * u),
-}
-PLACES = {
-    "left": ("left",),
-    "right": ("right",),
-    "both": ("left", "right"),
-    "along": ("half wave", "wave"),
-}
-"""Where unknown moments act, and along what of the cable."""
+def _half_waves(k: int, u: Array) -> Array:
+    return np.asarray(np.sin(k * np.pi * u))
 
-SIZES = (0.002, 0.007, 0.02)
+
+WAVES = {f"{k} half waves": partial(_half_waves, k) for k in (1, 2, 3, 4)}
+FORMS: dict[str, Callable[[Array], Array]] = {"left": lambda u: 1.0 - u, "right": lambda u: u, **WAVES}
+MOST = {"left": 1.0, "right": 1.0} | {label: wave.args[0] ** -2.0 for label, wave in WAVES.items()}
+"""Forms of unknown moments along the cable, and how large each is beside the others."""
+
+PLACES = {"left": ("left",), "right": ("right",), "both": ("left", "right"), "along": (*WAVES,)}
+"""Where unknown moments act, and in which forms."""
+
+SIZES = (0.003, 0.01, 0.03)
 """Of the range of curvatures, their standard deviation: steps of a factor 3.3, over which a normal density hardly
 changes, from what is just seen to what is another experiment."""
 

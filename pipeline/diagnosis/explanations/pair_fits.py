@@ -25,16 +25,17 @@ from rod.inverse.fit import FITS, fit_from
 
 
 def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int]) -> list[Explanation]:
-    """A single cause with each of some others, those in the model already left out."""
-    found = []
+    """A single cause with each of some others, those in the model already left out; hopeless fits end early."""
+    found, rival = [], np.inf
     for cause in causes:
         if cause == best.causes[0] or not second.of(cause).size:
             continue
         forms = kinds(second, cause)
         loud = [form for form in forms if second.statistic[form] >= NEARLY_AS_LOUD * second.statistic[forms[0]]]
-        fits = (fit_term(bench.observation, best.fitted, second, form) for form in loud)
+        fits = (fit_term(bench.observation, best.fitted, second, form, hopeless=rival + LEAST) for form in loud)
         fitted = min((one for one in fits if one is not None), key=cost, default=None)
         if fitted is not None:
+            rival = min(rival, fitted.chi2)
             found.append(explanation_of((best.causes[0], cause), bench.base, fitted))
     return found
 
