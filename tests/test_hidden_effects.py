@@ -192,7 +192,7 @@ def test_a_load_at_an_angle_is_named_however_the_cable_was_mounted(tared):
 
 def test_a_spring_that_stiffens_with_the_turn_of_its_bearing_is_named():
     """A cable led in through a seal, the left one stiffer: 2.2 times as stiff at 0.9 rad as at rest."""
-    cable = Cable(bearing_stiffness=5e-3, bearing_hardening=1.5, sides=(1.0, 0.6))
+    cable = Cable(bearing_spring=lambda turn: 5e-3 * (1.0 + 1.5 * turn**2) * turn, sides=(1.0, 0.6))
     part, _, _ = diagnose(faults_of_input(hidden_test(cable, SIX, largest=LARGEST, seed=17)), None, SETTINGS)
     assert part.verdict == "named", part.headline
     assert part.causes[0].name == "bearing_stiffness"

@@ -6,8 +6,8 @@ form of its own:
 pre-curvature   K0 is another one from a hold on: the cable rolled about its axis, or was laid in anew
 stiffness       all moments are multiplied by another factor from a hold on: a heater was switched on, a strand broke
 
-And forces may act that no model has, with moments that come and go over the steps under load as cosines of order o,
-normal about nothing, of a standard deviation that falls with 1 / (1 + o):
+And forces may act that no model has, with moments that come and go over the steps as cosines of order o, normal
+about nothing, of a standard deviation that falls with 1 / (1 + o):
 
 moments         at one bearing or both (a stop, a cable that is led in), falling to nothing at the other; or along the
                 cable (a pad, a magnet, a tether): loads of one to four half waves, as likely each, have moments
@@ -111,7 +111,7 @@ class OtherMoments(Cause):
         """The terms of each place where such moments may act, in each size."""
         for forms in PLACES.values():
             for size in SIZES:
-                orders = range(len(facts.pushed))
+                orders = range(len(facts.branch))
                 known = {(form, o): size * MOST[form] / (1 + o) for o in orders for form in forms}
                 every = (Variant(form, at=float(o), known=std) for (form, o), std in known.items())
                 yield tuple(Term(self, variant) for variant in every)
@@ -119,9 +119,8 @@ class OtherMoments(Cause):
     @staticmethod
     def course(variant: Variant, facts: Facts) -> Array:
         """Share (steps,) of the amount."""
-        pushed, course = list(facts.pushed), np.zeros(len(facts.branch))
-        course[pushed] = np.cos(np.pi * variant.at * (np.arange(len(pushed)) + 0.5) / len(pushed))
-        return course
+        count = len(facts.branch)
+        return np.asarray(np.cos(np.pi * variant.at * (np.arange(count) + 0.5) / count))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Move the rest by ``amount`` along a form, as its course says."""

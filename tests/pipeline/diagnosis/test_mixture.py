@@ -123,7 +123,7 @@ def test_the_band_is_that_of_the_law_that_is_stated():
     astray[law] += 2.0 * np.cos(2.0 * np.arange(law.stop))
     astray = replace(refit, vector=astray)
     one = SimpleNamespace(
-        found=SimpleNamespace(fitted=astray, begun=False), causes=(0,), something_else=False, probability=1.0
+        found=SimpleNamespace(fitted=astray, unnamed=False), causes=(0,), something_else=False, probability=1.0
     )
     grid, centre = error_grid(bench.observation, bench.facts), centre_of(answer)
     own = astray, again.fitted
