@@ -13,6 +13,7 @@ import pytest
 from fixtures.continuum import Cable, bend
 from fixtures.effects import LARGEST, PROTOCOLS
 from fixtures.hidden import Reading, hidden_test
+from fixtures.trials import f_error
 from tests.pipeline.diagnosis.among import among
 
 
@@ -58,24 +59,22 @@ def test_a_cable_that_becomes_stiffer_all_at_once(seed, rivals):
     assert size == pytest.approx(0.025, abs=4.0 * std) and part.leftover.values["step"] == test.steps[4].step
 
 
-@pytest.mark.parametrize(("seed", "rivals"), [(85, ""), (86, "bearing_friction bearing_stiffness in_plane_load")])
-def test_a_bearing_that_meets_a_stop(seed, rivals):
+@pytest.mark.parametrize(("protocol", "pad", "seed"), [("loop", 0.012, 85), ("six", 0.006, 86)])
+def test_a_bearing_that_meets_a_stop(protocol, pad, seed):
     """Free up to a turn, held by a rubber pad beyond it. Friction that differs from step to step comes near."""
-    cable = Cable(bearing_spring=lambda turn: 0.006 * np.maximum(turn - STOP, 0.0), sides=(1.0, 0.0))
-    test = hidden_test(cable, PROTOCOLS["six"], largest=LARGEST, seed=seed)
-    bent = bend(cable, [step.displacement for step in test.steps])
-    turned = [step.theta[0] - bent[0].theta[0] for step in bent]
-    part, _, _ = among(test, rivals)
+    cable = Cable(bearing_spring=lambda turn: pad * np.maximum(turn - STOP, 0.0), sides=(1.0, 0.0))
+    test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=seed)
+    part, _, _ = among(test, "")
     assert part.verdict == "unexplained" and part.leftover.key == "unnamed.moments", part.headline
-    said = part.leftover.values
-    assert said["place"]["key"] == "unnamed.left"
-    met = next(step.step for step, turn in zip(test.steps, turned, strict=True) if turn > STOP)
-    assert said["since"]["values"]["step"] in (met, met + 1)
-    assert said["step"] == test.steps[int(np.argmax(turned))].step
-    K, f, band = (np.array(getattr(part.extended, of)) for of in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2"))
-    true = cable.law(K - cable.K0)[1]
-    assert np.sqrt(np.mean((f / true - 1.0) ** 2)) < 0.02
-    assert np.mean(np.abs(f - true) < 1.96 * band) > 0.9
+    said, bent = part.leftover.values, bend(cable, [step.displacement for step in test.steps])
+    turned = np.array([step.theta[0] - bent[0].theta[0] for step in bent])
+    assert said["place"]["key"] == "unnamed.left" and said["step"] == test.steps[int(np.argmax(turned))].step
+    if protocol == "six":  # on a way back it is not told that what comes and goes does so all at once
+        assert said["since"]["values"]["step"] >= test.steps[int(np.argmax(turned > STOP))].step
+    size, std, _ = said["size"]
+    held = pad * np.max(turned - STOP)  # N m
+    assert -size * cable.EI1 - 3.0 * std * cable.EI1 < held < -size * cable.EI0 + 3.0 * std * cable.EI0
+    assert f_error(part.extended, cable)[0] < 0.02
 
 
 STOP = 0.3
