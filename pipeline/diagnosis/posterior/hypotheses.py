@@ -105,7 +105,7 @@ class Posterior:
 
 
 def posterior(hypotheses: Sequence[Hypothesis], causes: Sequence[Cause]) -> Posterior:
-    """Probabilities of hypotheses; of several about the same causes the likeliest refit counts.
+    """Probabilities of hypotheses; of several about the same causes the likeliest refit counts, unnamed ones apart.
 
     Parameters
     ----------
@@ -114,16 +114,20 @@ def posterior(hypotheses: Sequence[Hypothesis], causes: Sequence[Cause]) -> Post
     causes : sequence of Cause
         That share what is given to one cause, and to pairs, beforehand.
     """
-    best: dict[tuple[frozenset[int], bool], tuple[bool, float, Hypothesis]] = {}
+    best: dict[tuple[frozenset[int], bool, Explanation | None], tuple[bool, float, Hypothesis]] = {}
     for one in hypotheses:
+        unnamed = one.found if one.found is not None and one.found.unnamed else None
         for something_else, value in ((False, one.plain), (True, one.rest)):
-            key, found = (frozenset(one.causes), something_else), (one.found is not None or not one.causes, value, one)
+            key, found = (
+                (frozenset(one.causes), something_else, unnamed),
+                (one.found is not None or not one.causes, value, one),
+            )
             if np.isfinite(value) and (key not in best or found[:2] > best[key][:2]):
                 best[key] = found
     many = max(len(causes), 1)
     ways = {0: 1, 1: many, 2: max(many * (many - 1) // 2, 1)}
     rows = []
-    for (_, something_else), (_, value, one) in best.items():
+    for (_, something_else, _), (_, value, one) in best.items():
         share = SHARES[len(one.causes)][something_else] / ways[len(one.causes)]
         rows.append((value + np.log(share), one, something_else))
     top = max(value for value, *_ in rows)

@@ -79,14 +79,18 @@ def _twins(bench: Workbench, conclusion: Conclusion) -> list[TwinPart]:
 
 def hypotheses(bench: Workbench, conclusion: Conclusion) -> tuple[list[HypothesisPart], float]:
     """The whole posterior, most probable first, and the probability of none of these."""
-    catalogue, shown, none = bench.suspicion.causes, list[HypothesisPart](), 0.0
+    catalogue, whole = bench.suspicion.causes, dict[tuple[frozenset[int], bool], tuple[tuple[int, ...], float]]()
     for one in conclusion.posterior.believed:
-        if one.something_else and not one.causes:
-            none = one.probability
-        elif one.probability >= TOLD:
-            names = [catalogue[k].name for k in one.causes]
-            shown.append(HypothesisPart(causes=names, something_else=one.something_else, probability=one.probability))
-    return shown, none
+        key = frozenset(one.causes), one.something_else
+        causes, probability = whole.get(key, (one.causes, 0.0))
+        whole[key] = causes, probability + one.probability
+    _, none = whole.pop((frozenset(), True), ((), 0.0))
+    told = sorted(whole.items(), key=lambda row: -row[1][1])
+    return [
+        HypothesisPart(causes=[catalogue[k].name for k in causes], something_else=rest, probability=probability)
+        for (_, rest), (causes, probability) in told
+        if probability >= TOLD
+    ], none
 
 
 TOLD = 1e-6
