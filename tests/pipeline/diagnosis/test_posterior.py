@@ -1,6 +1,7 @@
 """Evidence against dense normal densities; what is believed of noise, of patterns no cause makes, of scatter."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -325,7 +326,7 @@ def test_hypotheses_are_told_and_sum_to_one():
 
 def test_the_nearest_cause_is_the_likeliest_beside_something_else():
     """Where nothing explains the data, causes alone have no probability that a number can hold: all of them 0."""
-    first, second = object(), object()
+    first, second = (SimpleNamespace(unnamed=False) for _ in range(2))
     hypotheses = [
         Hypothesis((), -19000.0, -900.0),
         Hypothesis((0,), -15000.0, -700.0, first),
