@@ -31,11 +31,11 @@ from pipeline.vision.search.candidates import Reading, approaches_itself, branch
 from pipeline.vision.search.closeup import edge_spreads, take_closeup
 from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import (
-    COVER_MARGIN_WIDTHS,
+    TRIMMED_WIDTHS,
     at_border,
-    between_axes,
     find_end,
-    lead_to_axes,
+    led_to_axes,
+    outside_covers,
     settle_end,
     without_specks,
 )
@@ -107,7 +107,9 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
         if branching:  # which of its arms leaves the picture nobody can tell
             return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
         return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
-    path = lead_to_axes(standout, strip.path, reading.width, axes)
+    path = _up_to_axes(standout, strip.path, axes, reading.width)
+    if path is None:
+        return refused(photo, "photo/bearing.nothing")
     cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
@@ -133,6 +135,13 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     std, grid = 0.3 * standout.reduction, photo.grid_px
     evidence = weigh(course, widths, std=std, share=share, branching=branching, grid=grid)
     return replace(found, branching=branching, goes_on=more is not None, evidence=evidence, findings=told)
+
+
+def _up_to_axes(standout: Standout, path: Array, axes: tuple[Bearing, Bearing], width: float) -> Array | None:
+    """The path (cells) led on to the rims of covers and to axes without; None if hardly any of it is between them."""
+    width_px = width * standout.reduction
+    led, body = led_to_axes(standout.to_pixels(path), axes, width_px, trimmed=TRIMMED_WIDTHS * width_px)
+    return None if body is None else standout.to_cells(led[outside_covers(led, axes, width_px)])
 
 
 def refused_at(photo: Photo, key: str, place: Sequence[float] | Array) -> Rejected:
@@ -189,7 +198,7 @@ def _assemble(
     path = standout.to_pixels(cut.path)
     width = cut.usual_width * standout.reduction
     closeup, axes, path = _settled(photo, path[without_specks(cut.seen)], axes, cut.weights, width)
-    path, visible = between_axes(path, axes, COVER_MARGIN_WIDTHS * width)
+    path, visible = led_to_axes(path, axes, width)
     if visible is None:
         return refused(photo, "photo/bearing.nothing")
     return RoughCable(

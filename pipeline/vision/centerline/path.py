@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from pipeline.messages import Message
@@ -130,7 +128,8 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     along = arc_lengths(rough.path_px)
     if along[last] - along[first] < _LEAST_SEEN_RADII * half_width:
         return _lost(rough, 0.0)  # too few points to start a curve from
-    points, s = _guides(rough, along, half_width)
+    thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
+    points, s = rough.path_px[first : last + 1 : thin], along[first : last + 1 : thin]
     wanted = float(along[-1]) / (_PATH_KNOT_DIAMETERS * 2.0 * half_width)
     intervals = int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
@@ -173,42 +172,6 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     if softest > _SOFTER * blur:
         return follow(rough, half_width=0.5 * diameter, known=known, blur=softest)
     return sections
-
-
-def _guides(rough: RoughCable, along: Array, half_width: float) -> tuple[Array, Array]:
-    """Points ``(n, 2)`` of the rough path from which the search starts, half a half width apart, and their ``s``.
-
-    The shadow of a cover lies beside the cable just where that begins, and the mask takes both for one. So the last two
-    diameters before a cover, a quarter of what is seen at most, are laid on the curve that leads from the mask farther
-    in to the axis, through which the cable passes: a cubic, straight at the axis, where the cable bears no moment.
-    """
-    first, last = rough.visible
-    thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
-    chosen = np.arange(first, last + 1, thin)
-    points, s = rough.path_px[chosen].astype(float), along[chosen]
-    led = min(4.0 * half_width, 0.25 * float(s[-1] - s[0]))
-    for axis, bearing, end in ((0, rough.left, s[0]), (len(along) - 1, rough.right, s[-1])):
-        beside = np.abs(s - end) < led
-        near = ~beside & (np.abs(s - end) < 2.0 * led)
-        if bearing.radius_px is None or np.count_nonzero(near) < 4:
-            continue
-        seam = end + (led if axis == 0 else -led)
-        lead = _lead(float(along[axis]), rough.path_px[axis], seam, s[near], points[near])
-        points[beside] = lead(s[beside])
-    return points, s
-
-
-def _lead(start: float, axis: Array, seam: float, s: Array, points: Array) -> Callable[[Array], Array]:
-    """The unseen piece from an axis: a cubic, straight at ``start``, that joins the parabola through points ``s``."""
-    there, slope = np.polynomial.polynomial.polyfit(s - seam, points, 2)[:2]
-    reach, chord = seam - start, (there - axis) / (seam - start)
-    third = 0.5 * (slope - chord) / reach**2
-
-    def at(s: Array) -> Array:
-        x = (s - start)[:, None]
-        return np.asarray(axis + (chord - third * reach**2) * x + third * x**3)
-
-    return at
 
 
 def _covers(rough: RoughCable, blur: float) -> tuple[Cover, ...]:

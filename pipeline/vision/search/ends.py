@@ -24,8 +24,8 @@ from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.strips import end_direction
 
-COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges so far beyond its circle
-_TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
+_COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges so far beyond its circle
+TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
 _BORDER_CELLS, _BORDER_WIDTHS = 2.0, 0.25  # cells and widths; so near the border an end is no end of the cable
 _CENTRED_WIDTHS = 0.04  # widths; how far aside of the cable's middle the search ends its path
 _EDGE_STD_PX = 0.25  # px; what halo, JPEG and grid move an edge, on all rows alike
@@ -43,7 +43,7 @@ class CableEnd:
 def find_end(path: Array, reading: Reading, standout: Standout) -> CableEnd:
     """The end at the last point of a path (cells): straight on through the mask until it stops or an object begins."""
     width = reading.width
-    trimmed = _TRIMMED_WIDTHS * width
+    trimmed = TRIMMED_WIDTHS * width
     body, outward = straight_body(path, width, trimmed)
     place, at_object = body[-1], False
     for step in np.arange(0.0, trimmed + 2.0 * width, 0.5):
@@ -72,31 +72,6 @@ def at_border(place: Sequence[float] | Array, photo: Photo, reduction: int, widt
     return bool(min(u, v, photo.size[0] - 1 - u, photo.size[1] - 1 - v) < reach)
 
 
-def lead_to_axes(standout: Standout, path: Array, width: float, axes: tuple[Bearing, Bearing]) -> Array:
-    """The path (cells) with straight ends up to the rim of each cover, or to the axis where there is no cover."""
-    margin = COVER_MARGIN_WIDTHS * width
-    for axis in axes:
-        path = path[::-1]
-        center = standout.to_cells(np.array(axis.center_px))
-        radius = 0.0 if axis.radius_px is None else axis.radius_px / standout.reduction + margin
-        distance = np.hypot(*(path - center).T)
-        path = path[: int(np.argmin(distance)) + 1]
-        outside = np.flatnonzero(distance[: len(path)] > radius)
-        body, outward = straight_body(
-            path[: max(3, outside[-1] + 1 if len(outside) else 3)], width, _TRIMMED_WIDTHS * width
-        )
-        steps = np.arange(1.0, max(_to_circle(body[-1], outward, center, radius), 1.0) + 1e-9)
-        path = np.vstack([body, body[-1] + steps[:, None] * outward])
-    return path
-
-
-def _to_circle(start: Array, direction: Array, center: Array, radius: float) -> float:
-    """Distance along a ray to a circle, or to the foot of its centre where the ray misses it."""
-    along = float((center - start) @ direction)
-    aside = float(np.hypot(*(center - start - along * direction)))
-    return along - float(np.sqrt(max(radius**2 - aside**2, 0.0)))
-
-
 def settle_end(axis: Bearing, path: Array, closeup: Standout, width: float) -> tuple[Bearing, Array]:
     """Put an axis that is a visible end where the refined path ends; a free end to a fraction of a pixel.
 
@@ -114,7 +89,7 @@ def settle_end(axis: Bearing, path: Array, closeup: Standout, width: float) -> t
     """
     if axis.kind not in ("end", "clamp"):
         return axis, path
-    body, outward = straight_body(path, width, 1.5 * _TRIMMED_WIDTHS * width)
+    body, outward = straight_body(path, width, 1.5 * TRIMMED_WIDTHS * width)
     reach = max(float((path[-1] - body[-1]) @ outward), 1.0)
     path = led_on(body, outward, reach, width)
     settled = replace(axis, center_px=(float(path[-1][0]), float(path[-1][1])))
@@ -193,35 +168,64 @@ def runs_of(seen: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(steps == 1).tolist(), np.flatnonzero(steps == -1).tolist(), strict=True))
 
 
-def between_axes(path: Array, axes: tuple[Bearing, Bearing], margin: float) -> tuple[Array, tuple[int, int] | None]:
-    """Cut the path (px, left to right) to what is seen between the axes and lead it straight on to them.
+def led_to_axes(
+    path: Array, axes: tuple[Bearing, Bearing], width: float, *, trimmed: float = 0.0
+) -> tuple[Array, tuple[int, int] | None]:
+    """What of a path (n, 2) px lies between its axes and outside of their covers, led on to the axes.
+
+    The shadow of a cover lies beside the cable just where that begins, and a mask takes both for one. So the last two
+    diameters before a cover, a quarter of what is seen at most, are laid on the curve that leads from farther in to the
+    axis, through which the cable passes: a cubic, straight at the axis, where the cable bears no moment. To an axis
+    without a cover the way is straight, from ``trimmed`` before the path's end.
 
     Returns
     -------
-    path : (k, 2) px
-    visible : (first, last) or None
-        None if less than five points are seen.
+    path : (k, 2)
+        From axis to axis.
+    body : (first, last) or None
+        What of it is the path's own, both included; None if less than five points are.
     """
-    left, right = (np.array(axis.center_px) for axis in axes)
-    start, stop = (int(np.argmin(np.hypot(*(path - place).T))) for place in (left, right))
-    usable = np.zeros(len(path), bool)
-    usable[start : stop + 1] = True
-    for axis, place in zip(axes, (left, right), strict=True):
-        if axis.radius_px is not None:
-            usable &= np.hypot(*(path - place).T) > axis.radius_px + margin
+    start, stop = (int(np.argmin(np.hypot(*(path - axis.center_px).T))) for axis in axes)
+    usable = outside_covers(path, axes, width)
+    usable[:start] = usable[stop + 1 :] = False
     indices = np.flatnonzero(usable)
     if len(indices) < 5:
         return path, None
-    body = path[indices[0] : indices[-1] + 1]
-    spacing = median(step_lengths(body))
-    head, tail = _lead(left, body[0], spacing), _lead(right, body[-1], spacing)[::-1]
-    return np.vstack([head, body, tail]), (len(head), len(head) + len(body) - 1)
+    path = path[indices[0] : indices[-1] + 1]
+    leads = []
+    for axis in reversed(axes):
+        path, lead = _led_on_to(path[::-1], axis, width, trimmed)
+        leads.append(lead)
+    tail, head = leads
+    return np.vstack([head, path, tail[::-1]]), (len(head), len(head) + len(path) - 1)
 
 
-def _lead(axis: Array, start: Array, spacing: float) -> Array:
-    """Points from the axis to ``start``, without it; none if the axis is there already."""
-    distance = float(np.hypot(*(start - axis)))
-    if distance < 1e-6:
-        return np.empty((0, 2))
-    count = max(1, int(distance / spacing))
-    return np.asarray(axis + np.arange(count)[:, None] / count * (start - axis))
+def outside_covers(path: Array, axes: tuple[Bearing, Bearing], width: float) -> NDArray[np.bool_]:
+    """Points ``(n,)`` of a path, px, at which covers do not spoil the edges of a cable so wide."""
+    margin = _COVER_MARGIN_WIDTHS * width
+    radii = [-1.0 if axis.radius_px is None else axis.radius_px + margin for axis in axes]
+    away = [np.hypot(*(path - axis.center_px).T) > radius for axis, radius in zip(axes, radii, strict=True)]
+    return np.asarray(np.all(away, axis=0))
+
+
+def _led_on_to(path: Array, axis: Bearing, width: float, trimmed: float) -> tuple[Array, Array]:
+    """A path that begins near an axis, laid on the curve from there, and the points from the axis to it without it."""
+    s = arc_lengths(path)
+    led = min(2.0 * width, 0.25 * float(s[-1]))
+    near = (s >= led) & (s < 2.0 * led)
+    covered = axis.radius_px is not None and np.count_nonzero(near) >= 4
+    if not covered:
+        path, led = path[min(int(np.searchsorted(s, trimmed)), len(path) - 3) :], 0.0
+        s = arc_lengths(path)
+    ahead = float(np.hypot(*(path[0] - axis.center_px)))
+    if ahead < 1e-6:
+        return path, np.empty((0, 2))
+    there, slope = path[0], (path[0] - axis.center_px) / ahead
+    if covered:
+        there, slope = np.polynomial.polynomial.polyfit(s[near] - led, path[near], 2)[:2]
+    reach, chord = ahead + led, (there - axis.center_px) / (ahead + led)
+    third = 0.5 * (slope - chord) / reach**2
+    count = max(1, int(ahead / median(np.diff(s))))
+    x = np.concatenate([np.arange(count) * (ahead / count), ahead + s[s < led]])[:, None]
+    lead = axis.center_px + (chord - third * reach**2) * x + third * x**3
+    return np.vstack([lead[count:], path[len(lead) - count :]]), lead[:count]
