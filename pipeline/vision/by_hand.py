@@ -80,4 +80,4 @@ def reading_along(standout: Standout, path_px: tuple[tuple[float, float], ...], 
     width = width_px / standout.reduction
     mask = np.zeros(standout.residual.shape[:2], np.uint8)
     cv2.polylines(mask, [np.rint(path).astype(np.int32)], False, 1, max(1, round(width)))
-    return Reading((Strip(path, width, 0.0),), mask, np.zeros_like(mask), width, 0.0)
+    return Reading((Strip(path, width),), mask, np.zeros_like(mask), width, 0.0)

@@ -30,7 +30,6 @@ _LEAST_LIKENESS = 0.45  # cables on webcam photos reach 0.6 and more; with paper
 _STEADY = 0.1  # of what camera and edges explain: a width as constant as that is as good as any
 _LEVEL = 1.0 / 512.0  # of full range; half a level of 8 bits: no photo is calmer than its rounding
 _CALM_PX, _CALM = 0.5, 0.04  # width's scatter that every camera makes: px of halo, JPEG and grid; share of the width
-_ALIKE = 0.25  # of the step between strip and ground; grey levels nearer than that are those of one thing
 _ALONG = 5  # sections pooled for the width's constancy, unless its waves are longer
 _LEAST_WAVES = 6  # of a strip whose outline swells and narrows again and again: fewer may be anything
 _REPEATED = 0.5  # correlation of the width with itself one wave on: of any other widths it is less
@@ -52,7 +51,7 @@ class Evidence:
         Scatter of the width, waves averaged, over what camera and edges explain; about 1 or less on a cable. Infinite
         where nothing was weighed.
     crossed : (u, v) px or None
-        Where what is beside the strip on both sides looks like the strip itself.
+        Where something that looks like the strip leaves it.
     """
 
     length: float = 0.0
@@ -124,7 +123,13 @@ class Course:
 
 
 def weigh(
-    course: Course, widths: Array, *, std: float, share: float = 1.0, branching: bool = False, grid: float = 1.0
+    course: Course,
+    widths: Array,
+    *,
+    std: float,
+    share: float = 1.0,
+    crossed: tuple[float, float] | None = None,
+    grid: float = 1.0,
 ) -> Evidence:
     """The evidence for a strip.
 
@@ -137,8 +142,8 @@ def weigh(
         Of a width, by what scatter its edges have.
     share : float
         Of the length asked for, on which widths were found.
-    branching : bool
-        Something seems to leave the strip: one side that looks like it is then enough for a crossing.
+    crossed : (u, v) px or None
+        Where something leaves the strip.
     grid : px
         Distance of values of the picture that tell something new.
     """
@@ -159,7 +164,7 @@ def weigh(
         seen=float(np.mean(weaker > _SURE)) * share,
         edges=median(weaker),
         unsteady=_unsteady(widths, width, std, grid),
-        crossed=_crossed(picture, offset / width, middle, max(1, each // 4), sides=1 if branching else 2),
+        crossed=crossed,
     )
 
 
@@ -202,32 +207,6 @@ def _wave(widths: Array) -> int:
     down = int(np.argmax(alike < 0.0))
     length = down + int(np.argmax(alike[down:]))
     return max(_ALONG, length) if alike[length] > _REPEATED * alike[0] else _ALONG
-
-
-def _crossed(
-    picture: NDArray[np.float32], offset: Array, places: Array, each: int, *, sides: int
-) -> tuple[float, float] | None:
-    """Where rays from 0.62 widths on look like the core within three widths on so many sides, if anywhere.
-
-    To 1.4 widths where they do on both sides, to two widths where on one: so large is no bolt. Not on the first and
-    last three widths: there covers and clamps are. ``each`` rows of the picture make a ray, four rays a width.
-    """
-    rays = _blocks(picture, each)
-    core = np.median(rays[:, np.abs(offset) < 0.3], axis=1)
-    beside = (np.abs(offset) > 0.62) & (np.abs(offset) < (1.4 if sides == 2 else 2.0))
-    step = _ALIKE * abs(median(rays[:, beside]) - median(core))
-    # where the strip itself is not seen, its ground looks like it
-    like = (np.abs(rays - core[:, None]) < step) & (np.abs(core - median(core)) < step)[:, None]
-    found = [like[:, beside & (side * offset > 0.0)].all(axis=1) for side in (-1.0, 1.0)]
-    near = np.ones(12)
-    if len(rays) <= 2 * len(near):
-        return None
-    met = np.sum([np.convolve(side, near, mode="same") > 0 for side in found], axis=0) >= sides
-    met[: len(near)] = met[-len(near) :] = False
-    if not met.any():
-        return None
-    place = places[int(np.argmax(met)) * each]
-    return float(place[0]), float(place[1])
 
 
 def unlike_a_cable(evidence: Evidence) -> Message:

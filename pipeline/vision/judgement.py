@@ -27,9 +27,9 @@ from pipeline.vision.search.beyond import (
     goes_on_at,
     rest_faced_at,
 )
-from pipeline.vision.search.candidates import Reading, approaches_itself, branches
+from pipeline.vision.search.candidates import Reading, approaches_itself
 from pipeline.vision.search.closeup import edge_spreads, take_closeup
-from pipeline.vision.search.crosscut import CrossCut, cut_across, path_normals
+from pipeline.vision.search.crosscut import CrossCut, crossed_at, cut_across, path_normals
 from pipeline.vision.search.ends import (
     TRIMMED_WIDTHS,
     at_border,
@@ -101,11 +101,12 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
         return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
+    arm = crossed_at(standout, cut)
+    crossed = None if arm is None else (float(standout.to_pixels(arm)[0]), float(standout.to_pixels(arm)[1]))
     axes = _axes(photo, standout, reading, strip, cut, cable)
-    branching = branches(strip, reading)
     if isinstance(axes, Rejected):
-        if branching:  # which of its arms leaves the picture nobody can tell
-            return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
+        if crossed is not None:  # which of its arms leaves the picture nobody can tell
+            return refused_at(photo, "photo/crossing", crossed)
         return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
     path = _up_to_axes(standout, strip.path, axes, reading.width)
     if path is None:
@@ -133,8 +134,8 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     course = Course(found.grey, found.origin_px, found.dark, path, path_normals(path)[1])
     # a cell's edge is found to a fifth of it
     std, grid = 0.3 * standout.reduction, photo.grid_px
-    evidence = weigh(course, widths, std=std, share=share, branching=branching, grid=grid)
-    return replace(found, branching=branching, goes_on=more is not None, evidence=evidence, findings=told)
+    evidence = weigh(course, widths, std=std, share=share, crossed=crossed, grid=grid)
+    return replace(found, goes_on=more is not None, evidence=evidence, findings=told)
 
 
 def _up_to_axes(standout: Standout, path: Array, axes: tuple[Bearing, Bearing], width: float) -> Array | None:

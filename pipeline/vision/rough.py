@@ -77,8 +77,6 @@ class RoughCable:
     grid_px : float
         Of the photo that ``grey`` is of; see `pipeline.vision.photo.Photo`.
     findings : tuple of Finding
-    branching : bool
-        Something of the cable's width seems to leave it: its course may be ambiguous.
     goes_on : bool
         The cable seems to go on beyond an end of it.
     evidence : Evidence
@@ -98,7 +96,6 @@ class RoughCable:
     weights: tuple[float, ...] = (1.0,)
     grid_px: float = 1.0
     findings: tuple[Finding, ...] = ()
-    branching: bool = False
     goes_on: bool = False
     evidence: Evidence = field(default_factory=Evidence)
 

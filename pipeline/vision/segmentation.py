@@ -217,25 +217,16 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
             return refusal
     if not best.evidence.enough:
         return Rejected(photo.name, unlike_a_cable(best.evidence))
-    # in one colour the arms of a crossing look alike, whatever cables they are of
-    if best.evidence.crossed is not None or (best.branching and (best.grid_px > 1.0 or _is_piece(best))):
-        return refused_at(photo, "photo/crossing", best.evidence.crossed or best.path_px[len(best.path_px) // 2])
+    if best.evidence.crossed is not None:
+        return refused_at(photo, "photo/crossing", best.evidence.crossed)
     other = next((found for found in likely if _is_rival(found, best)), None)
     if other is not None:
-        return _two(photo, best, other)
+        return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=other.length_px)
     beside = [_length_beyond(path, best) for _, refusal, path in refusals if refusal.code in _OF_A_CABLE]
     if max(beside, default=0.0) <= _RIVAL * best.length_px:
         return best
     taken = doubtful("photo/two-candidates.taken", one_px=best.length_px, other_px=max(beside))
     return replace(best, findings=(*best.findings, taken))
-
-
-def _two(photo: Photo, best: RoughCable, other: RoughCable) -> Rejected:
-    """The refusal of two strips, one of which may be the cable, or both, where they meet."""
-    met = [place for place in (_meets(other, best), _meets(best, other)) if place is not None]
-    if met:
-        return refused_at(photo, "photo/crossing", met[0])
-    return refused(photo, "photo/two-candidates", one_px=best.length_px, other_px=other.length_px)
 
 
 def _widest_alike(likely: list[RoughCable]) -> RoughCable:
@@ -249,13 +240,6 @@ def _widest_alike(likely: list[RoughCable]) -> RoughCable:
         if wider and found.evidence.value > 0.85 * best.evidence.value and _lies_on(found, [best.path_px]):
             best = found
     return best
-
-
-def _meets(one: RoughCable, other: RoughCable) -> Array | None:
-    """Where an end of one strip lies on another, if it does."""
-    ends = one.path_px[[0, -1]]
-    distance = np.asarray(cKDTree(other.path_px).query(ends)[0])
-    return np.asarray(ends[int(np.argmin(distance))]) if distance.min() < 4.0 * other.half_width_px else None
 
 
 def _is_rival(found: RoughCable, best: RoughCable) -> bool:

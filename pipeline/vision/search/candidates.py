@@ -36,9 +36,6 @@ from pipeline.vision.search.strips import (
 
 MIN_PARTNER_WIDTHS = 8.0  # widths; an end that meets a strip shorter than that meets a bolt or a letter
 _JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
-_MIN_BRANCH_WIDTHS = 2.5  # widths; shorter spurs of the skeleton come from the mask's rim, longer ones are branches
-_JUNCTION_WIDTHS = 3.5  # widths; strips' ends that meet at a crossing are so near
-_TOUCHING_WIDTHS = 2.0  # widths; an end nearer than that to the middle of another strip as wide touches it
 _LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next: texture may push it up or down
 _LOWEST_LEVEL = 3.0  # sigmas of the ground; the last level that is tried, below it noise makes strips
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
@@ -94,41 +91,6 @@ def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ..
             yield (reading,)
     if not given:
         yield (best,)
-
-
-def branches(strip: Strip, reading: Reading) -> bool:
-    """True if something of the cable's width leaves, crosses or meets the strip, so that its course is ambiguous."""
-    width = reading.width
-    if strip.branch >= _MIN_BRANCH_WIDTHS * width:
-        return True
-    reach = _JUNCTION_WIDTHS * width
-    long = [other for other in reading.strips if other.length > MIN_PIECE_WIDTHS * width]
-    if any(sum(_arms(other.path, end, reach) for other in long) >= 3 for end in (strip.path[0], strip.path[-1])):
-        return True
-    partners = [o for o in reading.strips if o is not strip and o.length > MIN_PARTNER_WIDTHS * width]
-    meets = [_touches(end, a, b) for other in partners for a, b in ((strip, other), (other, strip)) for end in (0, -1)]
-    return any(meets)
-
-
-def _arms(path: Array, junction: Array, reach: float) -> int:
-    """How many ends of a path lie at a junction and lead away from it: 0, 1, or 2 of a loop.
-
-    A piece that stays within reach is no arm: a letter, a bearing cover, a shadow where the cable ends.
-    """
-    if np.hypot(*(path - junction).T).max() <= reach:
-        return 0
-    return int((np.hypot(*(path[[0, -1]] - junction).T) < reach).sum())
-
-
-def _touches(end: int, strip: Strip, other: Strip) -> bool:
-    """True if an end of ``strip`` lies on the course of ``other``, away from the ends of that.
-
-    Each counts by its own width: a ruler beside the cable is wider than that.
-    """
-    near = (_TOUCHING_WIDTHS - 0.5) * strip.width + 0.5 * other.width
-    margin = int(2.0 * near)
-    inner = other.path[margin : len(other.path) - margin]
-    return bool(len(inner)) and bool(np.hypot(*(inner - strip.path[end]).T).min() < near)
 
 
 def approaches_itself(path: Array, width: float) -> bool:

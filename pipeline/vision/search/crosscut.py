@@ -31,6 +31,8 @@ SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend
 _CORE = ((-0.35, 0.35),)  # widths from the middle
 _CLOSE_BY = ((-0.85, -0.65), (0.65, 0.85))  # widths; beyond the blur of the edges, within a jaw not twice as wide
 SEEN_SHARE = 0.4  # of the median contrast; from it on a section counts as seen
+_ARM_WIDTHS = 2.9  # widths from the middle to which what leaves a strip is followed: no bolt beside it reaches so far
+_ALIKE = 0.25  # of the step between strip and ground; grey levels nearer than that are those of one thing
 
 PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mask's middle half a width aside
 _PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer
@@ -152,6 +154,31 @@ def cut_across(
         weights=weights,
         dark=sign < 0,
     )
+
+
+def crossed_at(standout: Standout, cut: CrossCut) -> Array | None:
+    """Cell ``(2,)`` where a piece that looks like a strip leads away from it, farther than bolts reach, if any does.
+
+    Not on its first and last three widths: there covers and clamps are.
+    """
+    width, each = cut.usual_width, max(1, round(0.25 * cut.usual_width))
+    offsets = np.linspace(-_ARM_WIDTHS, _ARM_WIDTHS, 59)
+    points = cut.path[:, None] + width * offsets[:, None] * path_normals(cut.path)[1][:, None]
+    grey = sampled(standout.residual, points).reshape(len(points), 59, -1) @ cut.weights.astype(np.float32)
+    count = len(grey) // each
+    rays = grey[: count * each].reshape(count, each, -1).mean(axis=1)
+    # a path that takes a corner at a crossing misses the cable there
+    core = median_filter(medians(rays[:, np.abs(offsets) < 0.3], axis=1), 25, mode="nearest")
+    step = _ALIKE * abs(cut.contrast)
+    # where the strip itself is not seen, its ground looks like it
+    like = (np.abs(rays - core[:, None]) < step) & (np.abs(core - median(core)) < step)[:, None]
+    like[:12] = like[-12:] = False
+    for side in (like[:, offsets < -0.6][:, ::-1], like[:, offsets > 0.6]):
+        _, pieces = cv2.connectedComponents(side.astype(np.uint8))
+        arms = np.intersect1d(pieces[:, 0], pieces[:, -1])
+        if arms[-1:] > 0:
+            return np.asarray(cut.path[int(np.median(np.flatnonzero(pieces[:, 0] == arms[-1]))) * each])
+    return None
 
 
 def _beside(offset_widths: Array) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from scipy.stats import theilslopes
 from pipeline.records import Array
 from pipeline.vision.median import median, scatter
 from pipeline.vision.photo import Photo, sampled
-from pipeline.vision.polyline import arc_lengths, step_lengths
+from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading

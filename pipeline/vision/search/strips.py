@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 from skimage.graph import pixel_graph
 from skimage.morphology import skeletonize
 
@@ -45,13 +44,10 @@ class Strip:
         Along the middle, from one end to the other.
     width : cells
         Median along the path.
-    branch : cells
-        Length of the longest part of the skeleton that leaves the path.
     """
 
     path: Array
     width: float
-    branch: float
 
     @property
     def length(self) -> float:
@@ -136,7 +132,6 @@ def join_strips(strips: list[Strip], width: float, *, gap: float) -> list[Strip]
         joined = Strip(
             np.vstack([first, _bridge(first[-1], second[0]), second]),
             float(share @ (a.width, b.width)),
-            max(a.branch, b.branch),
         )
         strips = [strip for k, strip in enumerate(strips) if k not in (i, j)] + [joined]
 
@@ -202,26 +197,12 @@ def _trace(piece: Mask, width: float) -> Strip | None:
     depth = cv2.distanceTransform(piece, cv2.DIST_L2, 5)
     along = 2.0 * depth[vu[nodes][:, 0], vu[nodes][:, 1]] - 1.0  # the centre of a cell counts as inside by half a cell
     inner = along[len(along) // 10 : len(along) - len(along) // 10] if len(along) > 20 else along
-    return Strip(path, median(inner), _longest_branch(skeleton, vu[nodes], width))
+    return Strip(path, median(inner))
 
 
 def _farthest(reach: Array) -> int:
     """Node with the longest way to it, among those that can be reached."""
     return int(np.argmax(np.where(np.isfinite(reach), reach, -1.0)))
-
-
-def _longest_branch(skeleton: NDArray[np.bool_], path_vu: NDArray[np.intp], width: float) -> float:
-    """Number of skeleton cells in the longest piece farther than a width from the path."""
-    aside = skeleton.copy()
-    aside[tuple(path_vu.T)] = False
-    vu = np.argwhere(aside)  # mostly none, or a spur or two
-    vu = vu[cKDTree(path_vu).query(vu)[0] > width] if len(vu) else vu
-    if not len(vu):
-        return 0.0
-    rest = np.zeros(np.ptp(vu, axis=0) + 1, np.uint8)
-    rest[tuple((vu - vu.min(axis=0)).T)] = 1
-    _, _, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
-    return float(stats[1:, cv2.CC_STAT_AREA].max())
 
 
 def _disc(diameter: float) -> Mask:

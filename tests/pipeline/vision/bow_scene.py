@@ -22,6 +22,7 @@ from pipeline.vision.render.lighting import EVEN, Light
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.scale.plane import PlaneMap
+from pipeline.vision.search.ends import led_to_axes
 from rod.characteristic import Characteristic
 from tests.rod.elastica import natural_chord, uniform_equilibrium
 
@@ -109,17 +110,21 @@ def rough_cable(
     scale = scene.camera.px_per_m
     half, cover = 0.5 * DIAMETER * scale, COVER * scale
     path = led_astray(picture, rng, spacing=0.5 * half, amount=min(1.5, 0.06 * half))
-    seen = np.flatnonzero((np.hypot(*(path - path[0]).T) > cover) & (np.hypot(*(path - path[-1]).T) > cover))
     ends = [picture.left_px, picture.right_px]
     if ends[0][0] > ends[1][0]:
         ends.reverse()
+    left, right = (Bearing(end, 0.03, cover, 0.1) for end in ends)
+    places = np.linspace(0.0, len(path) - 1.0, 4 * len(path))  # as close as the cells of a search
+    dense = np.column_stack([np.interp(places, np.arange(len(path)), each) for each in path.T])
+    path, visible = led_to_axes(dense, (left, right), 2.1 * half)
+    assert visible is not None
     shown = picture.pixels if pixels is None else pixels
     return RoughCable(
         image="photo.png",
         path_px=path,
-        visible=(int(seen[0]), int(seen[-1])),
-        left=Bearing(ends[0], 0.03, cover, 0.1),
-        right=Bearing(ends[1], 0.03, cover, 0.1),
+        visible=visible,
+        left=left,
+        right=right,
         half_width_px=1.05 * half,
         grey=shown.astype(np.float32) / np.float32(np.iinfo(shown.dtype).max),
         origin_px=(0, 0),

@@ -1,7 +1,6 @@
 """The cable is found on any usable photo and refused with its reason on any other. Truth: the rendered curve."""
 
 from dataclasses import replace
-from itertools import pairwise
 from math import pi
 
 import cv2
@@ -19,8 +18,6 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
-from pipeline.vision.search.candidates import Reading, branches
-from pipeline.vision.search.strips import Strip
 from pipeline.vision.segmentation import find_cable
 from tests.pipeline.vision.drawn import drawn
 
@@ -125,28 +122,6 @@ def test_cable_of_any_look_is_followed(look: str, cable: Cable) -> None:
         # a tenth of a pixel, 0.02 mm, as every cover is to be found
         assert np.hypot(*np.subtract(rough.left.center_px, picture.left_px)) < 0.1
         assert np.hypot(*np.subtract(rough.right.center_px, picture.right_px)) < 0.1
-
-
-def strip_of(*corners: tuple[float, float]) -> Strip:
-    """A strip ten cells wide through the corners, points a cell apart."""
-    legs = [np.linspace(a, b, int(np.hypot(*np.subtract(b, a)))) for a, b in pairwise(corners)]
-    return Strip(np.vstack(legs), 10.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("others", "crossing"),
-    [
-        ([((410, 0), (439, 0))], False),  # a cover three cables wide where the cable ends
-        ([((405, 8), (405, 34)), ((408, 0), (435, 0))], False),  # letters
-        ([((405, 5), (480, 80)), ((405, -5), (480, -80))], True),
-        ([((405, 5), (480, 80), (480, -80), (405, -5))], True),  # a loop
-    ],
-)
-def test_crossing_is_where_three_arms_lead_away(others: list[tuple[tuple[float, float]]], crossing: bool) -> None:
-    cable = strip_of((0, 0), (400, 0))
-    strips = (cable, *(strip_of(*corners) for corners in others))
-    none = np.zeros((1, 1), np.uint8)
-    assert branches(cable, Reading(strips, none, none, 10.0, 5.0)) == crossing
 
 
 def test_cover_about_three_cables_wide_makes_no_crossing() -> None:

@@ -6,7 +6,7 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from pipeline.vision.search.crosscut import find_flanks
-from pipeline.vision.search.strips import find_strips, thick_part
+from pipeline.vision.search.strips import thick_part
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -31,17 +31,6 @@ def test_nothing_is_thick_where_all_is_thin_and_all_is_where_nothing_is_left_out
     cv2.line(mask, (10, 100), (290, 120), 1, 21)
     assert not thick_part(mask, 40.0).any()
     assert thick_part(np.ones((200, 300), np.uint8), 40.0).all()
-
-
-@pytest.mark.parametrize("branch", [0, 60, 140])
-def test_branch_is_what_leaves_the_longest_path_by_more_than_a_width(branch):
-    mask, width = np.zeros((300, 500), np.uint8), 11
-    cv2.line(mask, (20, 60), (480, 60), 1, width)
-    if branch:
-        cv2.line(mask, (250, 60), (250, 60 + branch), 1, width)
-    (strip,) = find_strips(mask, np.zeros_like(mask), width)
-    assert strip.length == pytest.approx(460, abs=2 * width)
-    assert strip.branch == pytest.approx(max(branch - width, 0), abs=width)
 
 
 def test_a_flat_strip_of_unknown_width_shows_no_edges():
