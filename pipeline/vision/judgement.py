@@ -24,8 +24,7 @@ from pipeline.vision.search.beyond import (
     LEAST_MORE_WIDTHS,
     follow,
     followed_in,
-    goes_on_at,
-    rest_faced_at,
+    more_beyond,
 )
 from pipeline.vision.search.candidates import Reading, approaches_itself
 from pipeline.vision.search.closeup import edge_spreads, take_closeup
@@ -118,7 +117,7 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     if refusal is not None:
         return refusal
     others = [other for other in reading.strips if other is not strip]
-    more = goes_on_at(standout, cut, axes) or rest_faced_at(standout, cut, axes, others, length_px=cable.length_px)
+    more = more_beyond(standout, cut, axes, others, length_px=cable.length_px)
     if more is not None and not cable.any_length:
         return refused_at(photo, "photo/hidden-end.goes-on", more)
     found = _assemble(photo, standout, cut, axes, cable)

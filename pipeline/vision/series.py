@@ -30,7 +30,7 @@ from pipeline.records import (
 from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.series import SeriesSettings
 from pipeline.vision.bearings.covers import VERTICAL_DEG
-from pipeline.vision.bearings.steady import at_least, wandering_px
+from pipeline.vision.bearings.steady import wandering_px
 from pipeline.vision.centerline.axes_of_series import told_by_others
 from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import Followed, follow_cable, waves_of
@@ -47,7 +47,6 @@ from pipeline.vision.scale.calibration import (
     in_plane_of_cable,
     with_doubt_of_plane,
 )
-from pipeline.vision.scale.plane import chord_frame
 from pipeline.vision.shots import Shot, find_cables, of_one_size, with_fixed_cover
 from pipeline.vision.single import shown
 from pipeline.vision.stated_width import with_width_seen
@@ -179,15 +178,8 @@ def _followed(
     if wandering > 0.0:
         moved = doubtful("photo/camera-moved", side=fixed, shift_m=shift / calibration.scale.px_per_m)
         findings = (*findings, moved)
-        cables = [cable if isinstance(cable, Rejected) else _loosened(cable, wandering) for cable in cables]
+        cables = [cable if isinstance(cable, Rejected) else cable.loosened(wandering, wandering) for cable in cables]
     return shots, without_lay(cables, specimen.diameter_m), findings
-
-
-def _loosened(cable: Followed, std_px: float) -> Followed:
-    """The cable with axes whose standard deviation is ``std_px`` at least."""
-    rough = at_least(cable.rough, std_px)
-    chord = chord_frame(rough, cable.chord.plane, cable.chord.axis_parallax_std)
-    return replace(cable, rough=rough, chord=chord)
 
 
 def _tied(shots: list[Shot], cables: Sequence[Followed | Rejected], settings: VisionSettings) -> list[Line]:

@@ -100,12 +100,6 @@ def wandering_px(found: Sequence[RoughCable], play_px: float) -> tuple[Side, flo
     return side, float(np.sqrt(np.mean(np.var(_places(found, side), axis=0)))), min(went)
 
 
-def at_least(cable: RoughCable, std_px: float) -> RoughCable:
-    """The cable with axes whose standard deviation is ``std_px`` at least."""
-    left, right = (replace(axis, std_px=max(axis.std_px, std_px)) for axis in (cable.left, cable.right))
-    return replace(cable, left=left, right=right)
-
-
 def apart_px(cable: RoughCable, fixed: Fixed) -> float:
     """Distance of what was taken for the fixed cover from where it stands."""
     return float(np.hypot(*np.subtract(_axis(cable, fixed.side).center_px, fixed.cover.center_px)))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
+from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_errors, std_along
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
@@ -113,6 +113,13 @@ class Followed:
         covariance = fit.smooth.covariance + slow_errors(fit, *self.light)
         return replace(self, fit=fit, covariance=covariance, lay_std=lay_std)
 
+    def loosened(self, left: float, right: float) -> Followed:
+        """The cable with axes whose standard deviations (px) are so large at least."""
+        axes = ((self.rough.left, left), (self.rough.right, right))
+        wider = [replace(axis, std_px=max(axis.std_px, std)) for axis, std in axes]
+        rough = replace(self.rough, left=wider[0], right=wider[1])
+        return replace(self, rough=rough, chord=chord_frame(rough, self.chord.plane, self.chord.axis_parallax_std))
+
     @property
     def from_axis(self) -> Array:
         """Arc lengths (n,) m of the sections from the foot of the left axis."""
@@ -166,7 +173,25 @@ def follow_cable(
     metres = median(width / sections.width)
     light = sections.systematic_std * metres, LIGHT_LENGTH_SHARE * float(fit.s[-1] - fit.s[0])
     covariance = fit.smooth.covariance + slow_errors(fit, *light)
-    return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
+    return _doubted(Followed(rough, chord, sections, width, fit, covariance, light, diameter_m))
+
+
+def _doubted(cable: Followed) -> Followed:
+    """The cable with covers that are not surely its own as unsure as they lie beside it, beyond what is expected.
+
+    A scalloped rim, or the arc in which a thin cable is cut off, tells a centre with less scatter than error; the cable
+    that passes it is another reading of it.
+    """
+    sight = cable.sight()
+    if sight is None:
+        return cable
+    expected = np.diag(sight.covariance + told_alone(sight).covariance)
+    beyond = np.sqrt(np.maximum(sight.miss**2 - expected, 0.0)) / median(cable.width / cable.sections.width)
+    pairs = zip((cable.rough.left, cable.rough.right), beyond, strict=True)
+    left, right = (float(off) if axis.kind == "cover" and not axis.sure else 0.0 for axis, off in pairs)
+    return cable.loosened(
+        float(np.hypot(cable.rough.left.std_px, left)), float(np.hypot(cable.rough.right.std_px, right))
+    )
 
 
 def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:

@@ -82,11 +82,12 @@ def _uneven(fit: CurveFit, sections: Sections, middle: float) -> Message | None:
 def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: float) -> Message | None:
     """A flank or a shadow, which runs beside the cable from end to end; or another thing taken for a cover.
 
-    One cover that is surely seen may be passed beside: not every cable runs through the axis of its bearing.
+    One cover that is surely seen may be passed beside: not every cable runs through the axis of its bearing. One that
+    is not may lie elsewhere than it was found, but the cable runs over its axis.
     """
     axes = (rough.left, rough.right)
     radii = feet_of_axes(fit, chord)[1] / (0.5 * middle) * [axis.radius_px is not None for axis in axes]
-    doubted = [radius for radius, axis in zip(radii, axes, strict=True) if not axis.sure]
+    doubted = [_BESIDE_COVER * radius for radius, axis in zip(radii, axes, strict=True) if not axis.sure]
     share = float(max(radii.min(), *doubted, 0.0))
     return None if share <= _BESIDE_COVER else Message("photo/bearing.beside-cover", radii=min(share, 99.0))
 

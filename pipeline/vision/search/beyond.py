@@ -52,36 +52,6 @@ Axes = tuple[Bearing, Bearing]
 Place = tuple[float, float]
 
 
-def rest_ahead(standout: Standout, cut: CrossCut, others: list[Strip], *, at_start: bool) -> float | None:
-    """Gap in cells to another strip of the same look where an arc that leaves this one's end would go on, if any.
-
-    A sheet of paper hides more than is looked across, and is no larger thing where it has the ground's colour.
-
-    Parameters
-    ----------
-    standout : Standout
-    cut : CrossCut
-        The strip's cross-cuts.
-    others : list of Strip
-    at_start : bool
-        The first point, else the last.
-    """
-    path, width = cut.path[::-1] if at_start else cut.path, cut.usual_width
-    usual = median(_weber(standout, cut, width))
-    facing = [
-        (float(np.hypot(*(rest[0] - path[-1]))), rest)
-        for other in others
-        for rest in (other.path, other.path[::-1])
-        if other.length > MIN_PARTNER_WIDTHS * width and arc_joins(path, rest, width, _SHEET_TURN_DEG)
-    ]
-    near = [found for found in facing if found[0] <= _SHEET_WIDTHS * width]
-    for gap, rest in sorted(near, key=lambda found: found[0]):
-        more = cut_across(standout, rest, width, known=True, weights=cut.weights)
-        if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual)) > 0.5:
-            return gap
-    return None
-
-
 def follow(standout: Standout, cut: CrossCut, width: float, *, least: float = LEAST_MORE_WIDTHS) -> Array | None:
     """The path of a strip, led on beyond both ends for as long as there is more of the same, ``least`` widths long.
 
@@ -185,32 +155,53 @@ def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
     return np.asarray(cut.step / np.maximum(ground.reshape(len(cut.path), -1).mean(axis=1), _BEYOND_DARKEST))
 
 
-def goes_on_at(standout: Standout, cut: CrossCut, axes: Axes) -> Place | None:
-    """A visible end beyond which there is more of the same close by."""
-    width = cut.usual_width
-    for axis, at_start in zip(axes, (True, False), strict=True):
-        path = cut.path[::-1] if at_start else cut.path
-        if axis.kind in ("end", "clamp") and _ahead(standout, cut, path, width) is not None:
-            return axis.center_px
-    return None
-
-
-def rest_faced_at(
+def more_beyond(
     standout: Standout, cut: CrossCut, axes: Axes, others: list[Strip], *, length_px: float | None
 ) -> Place | None:
-    """The visible end that faces another strip like this one nearest: the rest of the cable beyond what hides it.
+    """The visible end of a strip beyond which the cable goes on: straight on, or nearest to it beyond what hides it.
 
-    ``others`` are the other strips of the reading; a strip as long as the cable is known to be, ``length_px``, has no
-    rest.
+    A sheet of paper hides more than is looked across, and is no larger thing where it has the ground's colour.
+
+    Parameters
+    ----------
+    standout : Standout
+    cut : CrossCut
+        The strip's cross-cuts.
+    axes : pair of Bearing
+        At its first and its last point.
+    others : list of Strip
+        Other strips of the reading.
+    length_px : px or None
+        Of the cable; a strip so long has no rest beyond a sheet.
     """
-    length = float(step_lengths(cut.path).sum())
+    paths = zip(axes, (cut.path[::-1], cut.path), strict=True)
+    ends = [(axis, path) for axis, path in paths if axis.kind in ("end", "clamp")]
+    for axis, path in ends:
+        if _ahead(standout, cut, path, cut.usual_width) is not None:
+            return axis.center_px
+    length, gaps = float(step_lengths(cut.path).sum()), []
     if length_px is not None and length * standout.reduction > _WHOLE_SHARE * length_px:
         return None
-    gaps: list[tuple[float, Place]] = []
-    for axis, at_start in zip(axes, (True, False), strict=True):
+    for axis, path in ends:
         # beyond a clamp the tail of the cable comes out again
         tail = _CLAMP_TAIL_SHARE * length if axis.kind == "clamp" else 0.0
-        rest = [other for other in others if other.length > tail]
-        gap = rest_ahead(standout, cut, rest, at_start=at_start) if axis.kind in ("end", "clamp") else None
+        gap = _gap_to_rest(standout, cut, path, [other for other in others if other.length > tail])
         gaps += [] if gap is None else [(gap, axis.center_px)]
     return min(gaps)[1] if gaps else None
+
+
+def _gap_to_rest(standout: Standout, cut: CrossCut, path: Array, others: list[Strip]) -> float | None:
+    """Gap in cells to another strip of the same look where an arc that leaves the path's end would go on, if any."""
+    width, usual = cut.usual_width, median(_weber(standout, cut, cut.usual_width))
+    facing = [
+        (float(np.hypot(*(rest[0] - path[-1]))), rest)
+        for other in others
+        for rest in (other.path, other.path[::-1])
+        if other.length > MIN_PARTNER_WIDTHS * width and arc_joins(path, rest, width, _SHEET_TURN_DEG)
+    ]
+    near = [found for found in facing if found[0] <= _SHEET_WIDTHS * width]
+    for gap, rest in sorted(near, key=lambda found: found[0]):
+        more = cut_across(standout, rest, width, known=True, weights=cut.weights)
+        if more.dark == cut.dark and np.mean(_alike(standout, more, width, usual)) > 0.5:
+            return gap
+    return None

@@ -152,6 +152,22 @@ def test_a_cable_may_pass_beside_one_cover_that_is_surely_seen(sides, sure, trac
     assert (found.findings[0].code if traced else found.code) == "photo/bearing"
 
 
+def test_a_cover_that_is_not_surely_seen_is_as_unsure_as_the_cable_lies_beside_it():
+    """An arc of its rim told a centre with less scatter than error: stated are 0.03 px, 20 px off."""
+    rng = np.random.default_rng(12)
+    scene = even(rng, camera={"mirrored": False, "roll_rad": 0.0})
+    rough = rough_cable(scene, render(scene), rng)
+    off = 0.7 * rough.half_width_px
+    axis = replace(rough.left, center_px=tuple(rough.left.center_px + np.array([0.0, -off])))
+    stated = {}
+    for sure in (False, True):
+        found = refused(replace(rough, left=replace(axis, sure=sure)), scene)
+        assert isinstance(found, Centerline), found.reason
+        stated[sure] = found.axis_std_px * np.sqrt(2.0)
+    assert 0.6 * off < stated[False] < 1.1 * off
+    assert stated[True] < 0.1
+
+
 def test_noise_and_blur_widen_the_band_and_refuse_only_where_no_edge_is_left():
     """Edges as faint as the noise of a pixel, and blur of half the radius: traced, and the band holds the truth."""
     rng = np.random.default_rng(10)
