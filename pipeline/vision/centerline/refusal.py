@@ -57,9 +57,9 @@ def refusal(
     whole = scale * sections.caliper
     figure = evidence.figures | ({} if diameter is None else {"width_over_diameter": whole / diameter})
     told = (
-        _another_width(whole, diameter, scale * sections.softest)
-        or (None if evidence.enough else unlike_a_cable(evidence))
+        (None if evidence.enough else unlike_a_cable(evidence))
         or (None if evidence.bordered else _uneven(fit, sections, middle))
+        or _another_width(whole, diameter, scale * sections.softest)
         or _beside_cover(rough, fit, chord, middle)
         or _bent(fit, middle)
     )
