@@ -173,7 +173,7 @@ def find_again(photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], radius: R
         if abs(rim.radius - cover.radius_px) > play:
             continue
         circle = with_rings(photo, rim, radius)
-        if circle.marked or circle.rim >= SURE_RIM:
+        if circle.sure:
             return circle
     return None
 
@@ -305,14 +305,15 @@ def find_bearings(
     expected = Radius(radius, std)
     axes: list[Bearing | None] = [None, None]
     for k, end in enumerate(ends):
-        circle = find_again(photo, end, hints.seen, expected)
         # strips of all readings of a photo end at a few places: each is searched once
         known = np.concatenate([end.place / radius, end.outward, np.log([radius, width_px])])
         alike = [found for other, found in hints.sought if np.abs(known - other).max() < _SAME_END]
-        if circle is None and not alike:
+        if not alike:
             alike = [find_cover(photo, end, expected, width_px)]
             hints.sought.append((known, alike[0]))
-        circle = circle or alike[0]
+        circle = alike[0]
+        if circle is None or not circle.sure:
+            circle = find_again(photo, end, hints.seen, expected) or circle
         if circle is None:
             break  # one is not enough, whatever the other would be
         axes[k] = circle.as_bearing()

@@ -54,10 +54,14 @@ class Circle:
     rim: float
     marked: bool = False
 
+    @property
+    def sure(self) -> bool:
+        """True if nearly all of it or a mark is seen."""
+        return self.marked or self.rim >= SURE_RIM
+
     def as_bearing(self) -> Bearing:
-        """The bearing axis under this cover, sure if nearly all of it or a mark is seen."""
-        sure = self.marked or self.rim >= SURE_RIM
-        return Bearing(self.center, self.std, self.radius, self.radius_std, "cover", sure)
+        """The bearing axis under this cover."""
+        return Bearing(self.center, self.std, self.radius, self.radius_std, "cover", self.sure)
 
 
 @dataclass(frozen=True)
