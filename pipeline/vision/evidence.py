@@ -3,8 +3,9 @@
 ``picture along the measured midline -> steps of both edges against the steps that the ground makes -> Evidence``
 
 Two edges along the seen length, a width as constant as the edges' own scatter lets it be, and nothing of the cable's
-look beside it on both sides. No figure needs a threshold that knows the photo: steps count in standard deviations of
-the same sums taken beside the cable, where there is no edge, so noise, texture and weave of the ground are in them.
+look that leaves it (`pipeline.vision.search.crosscut.crossed_at`). No figure needs a threshold that knows the photo:
+steps count in standard deviations of the same sums taken beside the cable, where there is no edge, so noise, texture
+and weave of the ground are in them.
 
 Lengths in px and in *widths* of the cable; a block is a piece of the cable one width long.
 """

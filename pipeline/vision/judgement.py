@@ -100,8 +100,7 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
         return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
-    arm = crossed_at(standout, cut)
-    crossed = None if arm is None else (float(standout.to_pixels(arm)[0]), float(standout.to_pixels(arm)[1]))
+    crossed = crossed_at(standout, cut)
     axes = _axes(photo, standout, reading, strip, cut, cable)
     if isinstance(axes, Rejected):
         if crossed is not None:  # which of its arms leaves the picture nobody can tell

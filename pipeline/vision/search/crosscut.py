@@ -156,8 +156,8 @@ def cut_across(
     )
 
 
-def crossed_at(standout: Standout, cut: CrossCut) -> Array | None:
-    """Cell ``(2,)`` where a piece that looks like a strip leads away from it, farther than bolts reach, if any does.
+def crossed_at(standout: Standout, cut: CrossCut) -> tuple[float, float] | None:
+    """Photo pixel where a piece that looks like a strip leads away from it farther than bolts reach, if any does.
 
     Not on its first and last three widths: there covers and clamps are.
     """
@@ -166,6 +166,8 @@ def crossed_at(standout: Standout, cut: CrossCut) -> Array | None:
     points = cut.path[:, None] + width * offsets[:, None] * path_normals(cut.path)[1][:, None]
     grey = sampled(standout.residual, points).reshape(len(points), 59, -1) @ cut.weights.astype(np.float32)
     count = len(grey) // each
+    if count <= 24:
+        return None
     rays = grey[: count * each].reshape(count, each, -1).mean(axis=1)
     # a path that takes a corner at a crossing misses the cable there
     core = median_filter(medians(rays[:, np.abs(offsets) < 0.3], axis=1), 25, mode="nearest")
@@ -176,8 +178,9 @@ def crossed_at(standout: Standout, cut: CrossCut) -> Array | None:
     for side in (like[:, offsets < -0.6][:, ::-1], like[:, offsets > 0.6]):
         _, pieces = cv2.connectedComponents(side.astype(np.uint8))
         arms = np.intersect1d(pieces[:, 0], pieces[:, -1])
-        if arms[-1:] > 0:
-            return np.asarray(cut.path[int(np.median(np.flatnonzero(pieces[:, 0] == arms[-1]))) * each])
+        if arms[-1] > 0:
+            u, v = standout.to_pixels(cut.path[int(np.median(np.flatnonzero(pieces[:, 0] == arms[-1]))) * each])
+            return float(u), float(v)
     return None
 
 
