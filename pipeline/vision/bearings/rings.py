@@ -79,8 +79,11 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
 
 
 def is_sure(photo: Photo, rim: Circle, radius: float) -> bool:
-    """Whether a rim is seen nearly all round, or what lies within it is a target: the same turned by half a turn."""
-    return rim.rim >= SURE_RIM or bool(_turned_half(photo, rim, radius))
+    """Whether a rim is seen nearly all round, or what lies within it is a target: the same turned by half a turn.
+
+    On few pixels the end of a cable is that too.
+    """
+    return rim.rim >= SURE_RIM or (radius > MARK_CELLS and bool(_turned_half(photo, rim, radius)))
 
 
 def _turned_half(photo: Photo, rim: Circle, radius: float) -> list[Circle]:
