@@ -6,8 +6,8 @@ form of its own:
 pre-curvature   K0 is another one from a hold on: the cable rolled about its axis, or was laid in anew
 stiffness       all moments are multiplied by another factor from a hold on: a heater was switched on, a strand broke
 
-And forces may act that no model has, with moments that come and go over the steps as cosines of order o, normal
-about nothing, of a standard deviation that falls with 1 / (1 + o):
+And forces may act that no model has, with moments that come and go over the steps, from the first or a later one
+on, as cosines of order o, normal about nothing, of a standard deviation that falls with 1 / (1 + o):
 
 moments         at one bearing or both (a stop, a cable that is led in), falling to nothing at the other; or along the
                 cable (a pad, a magnet, a tether): loads of one to four half waves, as likely each, have moments
@@ -45,7 +45,7 @@ class _Begun(Cause):
 
     seat = "cable"
 
-    def chance(self, facts: Facts) -> float:
+    def chance(self, variant: Variant, facts: Facts) -> float:
         """Probability beforehand of one of its forms, given that something else acts."""
         return SHARE / len(BEGUN) / len(self.variants(facts))
 
@@ -93,7 +93,10 @@ class OtherStiffness(_Begun):
 
 
 class OtherMoments(Cause):
-    """Moments over the steps: ``at`` is the order of their course, the label says along what of the cable."""
+    """Moments over the steps: the label says along what of the cable.
+
+    ``at`` is the order of their course, ``width`` the index of the step from which on they act.
+    """
 
     name = "unnamed.moments"
     unit = "1/m"
@@ -103,9 +106,10 @@ class OtherMoments(Cause):
         """The range of curvatures, of which shares are tried."""
         return facts.curvature_scale
 
-    def chance(self, facts: Facts) -> float:
-        """Probability beforehand of one place and size, given that something else acts."""
-        return SHARE / len(PLACES) / len(SIZES)
+    def chance(self, variant: Variant, facts: Facts) -> float:
+        """Probability beforehand of one place, size and begin, given that something else acts."""
+        begins = max(len(facts.pushed) - 1, 1) if variant.width else 1
+        return 0.5 * SHARE / len(PLACES) / len(SIZES) / begins
 
     def ways(self, facts: Facts) -> Iterator[tuple[Term, ...]]:
         """The terms of each place where such moments may act, in each size."""
@@ -116,11 +120,19 @@ class OtherMoments(Cause):
                 every = (Variant(form, at=float(o), known=std) for (form, o), std in known.items())
                 yield tuple(Term(self, variant) for variant in every)
 
+    def since(self, terms: Sequence[Term], facts: Facts) -> Iterator[tuple[Term, ...]]:
+        """The same moments, from each step under load but the first on."""
+        for first in facts.pushed[1:]:
+            later = (term._replace(variant=replace(term.variant, width=float(first))) for term in terms)
+            yield tuple(term for term in later if term.variant.at < len(facts.branch) - first)
+
     @staticmethod
     def course(variant: Variant, facts: Facts) -> Array:
         """Share (steps,) of the amount."""
-        count = len(facts.branch)
-        return np.asarray(np.cos(np.pi * variant.at * (np.arange(count) + 0.5) / count))
+        first, course = int(variant.width), np.zeros(len(facts.branch))
+        count = len(course) - first
+        course[first:] = np.cos(np.pi * variant.at * (np.arange(count) + 0.5) / count)
+        return course
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Move the rest by ``amount`` along a form, as its course says."""

@@ -32,6 +32,7 @@ from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import Weighed, refitted, weighed
 from rod.inverse.base_fit import settled
+from rod.inverse.extension import Term
 from rod.inverse.fit import FITS, Fit, fit_from
 
 MATTERS = 0.1
@@ -212,10 +213,18 @@ class Search:
             since = [k for k in loud if k is not None and about.statistic[k] ** 2 > least]
             fits = (fit_term(bench.observation, one.fitted, about, k, hopeless=hopeless) for k in since)
             self._weigh_unnamed(one.causes, fits)
-        extension, vector = bench.base.extension, bench.base.vector
-        models = (replace(extension, terms=terms) for terms in MOMENTS.ways(bench.facts))
-        starts = ((model, np.append(vector, np.zeros(len(model.terms)))) for model in models)
-        self._weigh_unnamed((), (fit_from(bench.observation, *start, bench.base) for start in starts))
+        self._weigh_unnamed((), self._with(MOMENTS.ways(bench.facts)))
+        likely = (one.found for one in self.posterior.beside_something_else() if one.probability > ALSO)
+        whole = next((one for one in likely if one is not None and one.unnamed and not one.causes), None)
+        if whole is not None and whole.fitted.extension.terms_of(MOMENTS):
+            self._weigh_unnamed((), self._with(MOMENTS.since(whole.fitted.extension.terms, bench.facts)))
+
+    def _with(self, every: Iterable[tuple[Term, ...]]) -> Iterator[Fit]:
+        """The base model with terms from nothing, fitted."""
+        base = self.bench.base
+        for terms in every:
+            start = np.append(base.vector, np.zeros(len(terms)))
+            yield fit_from(self.bench.observation, replace(base.extension, terms=terms), start, base)
 
     def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> None:
         seen = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)

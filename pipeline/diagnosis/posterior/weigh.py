@@ -66,13 +66,13 @@ def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:
     """The hypothesis of a refit, its forms one choice of many each; what has no name is something else."""
     own = evidence(grid, found.fitted)[0]
     extension = found.fitted.extension
-    unnamed = {cause for cause in UNNAMED if extension.terms_of(cause)}
+    unnamed = {cause: found_at[0] for cause in UNNAMED if (found_at := extension.terms_of(cause))}
     terms = (term for term in extension.terms if term.cause not in unnamed and not np.isfinite(term.variant.known))
     # all components of one thing are one choice
     chosen = dict.fromkeys((term.cause, _whole(term.cause, extension) or term) for term in terms)
     tried = sum(_kinds(cause, facts, whole=form is True) for cause, form in chosen)
     if unnamed:
-        chances = sum(float(np.log(cause.chance(facts))) for cause in unnamed)
+        chances = sum(float(np.log(cause.chance(extension.terms[k].variant, facts))) for cause, k in unnamed.items())
         return Hypothesis(found.causes, -np.inf, own.plain - tried + chances, found)
     return Hypothesis(found.causes, own.plain - tried, own.rest - tried, found)
 

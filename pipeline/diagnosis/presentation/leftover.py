@@ -53,30 +53,19 @@ def _unnamed(bench: Workbench, fitted: Fit) -> Message | None:
 
 
 def _moments(bench: Workbench, fitted: Fit) -> Message:
-    """Where moments act that no model has, since which step they are seen, and when they are largest."""
+    """Where moments act that no model has, since which step, and when they are largest."""
     extension, own = fitted.extension, fitted.extension.terms_of(MOMENTS)
     forms, at = [extension.terms[k].variant for k in own], [extension.amounts_at[k] for k in own]
     unit, rows = MOMENTS.together(forms, bench.facts)
-    size, std = (
-        rows @ fitted.vector[at],
-        np.sqrt(np.einsum("ij,jk,ik->i", rows, fitted.covariance[np.ix_(at, at)], rows)),
-    )
-    beyond = (np.abs(size) - SEEN * std).reshape(-1, len(bench.test.steps))
-    loudest, steps = int(np.argmax(beyond)), bench.test.steps
-    first = int(np.argmax((beyond > 0.0).any(axis=0)))
-    step, place = (
-        steps[loudest % len(steps)],
-        next(p for p, some in PLACES.items() if {*some} == {f.label for f in forms}),
-    )
+    loudest, labels = int(np.argmax(np.abs(rows @ fitted.vector[at]))), {form.label for form in forms}
+    row, steps, first = rows[loudest], bench.test.steps, int(forms[0].width)
+    step, std = steps[loudest % len(steps)], np.sqrt(row @ fitted.covariance[np.ix_(at, at)] @ row)
+    place = next(place for place, some in PLACES.items() if {*some} == labels)
     return Message(
         MOMENTS.name,
         place=Message(f"unnamed.{place}"),
-        since=Message("unnamed.since", step=steps[first].step) if first > bench.facts.pushed[0] else "",
+        since=Message("unnamed.since", step=steps[first].step) if first else "",
         step=step.step,
         branch=step.branch,
-        size=(float(size[loudest]), float(std[loudest]), unit),
+        size=(float(row @ fitted.vector[at]), float(std), unit),
     )
-
-
-SEEN = 3.0
-"""Standard deviations beyond which such a moment is seen at a step."""

@@ -69,8 +69,7 @@ def test_a_bearing_that_meets_a_stop(protocol, pad, seed):
     said, bent = part.leftover.values, bend(cable, [step.displacement for step in test.steps])
     turned = np.array([step.theta[0] - bent[0].theta[0] for step in bent])
     assert said["place"]["key"] == "unnamed.left" and said["step"] == test.steps[int(np.argmax(turned))].step
-    if protocol == "six":  # on a way back it is not told that what comes and goes does so all at once
-        assert said["since"]["values"]["step"] >= test.steps[int(np.argmax(turned > STOP))].step
+    assert said["since"]["values"]["step"] == test.steps[int(np.argmax(turned > STOP))].step
     size, std, _ = said["size"]
     held = pad * np.max(turned - STOP)  # N m
     assert -size * cable.EI1 - 3.0 * std * cable.EI1 < held < -size * cable.EI0 + 3.0 * std * cable.EI0
