@@ -73,7 +73,7 @@ class CausePart(Part):
             message = Message(f"form.{self.name}.{form.label}", at=form.at, width=form.width)
             if message.key in known:
                 parts = message.parts(language)  # the more was fitted, the more is told
-                amount = Message("form.of-amount", amount=(form.amount, form.std, self.unit)).said(language)
+                amount = Message("amount.of-form", amount=(form.amount, form.std, self.unit)).said(language)
                 said.append(parts[min(len(form.tuned), len(parts) - 1)] + (amount if apart else ""))
         return list(dict.fromkeys(said))
 

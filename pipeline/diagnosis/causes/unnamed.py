@@ -50,9 +50,13 @@ class _Begun(Cause):
         return SHARE / len(BEGUN) / len(self.variants(facts))
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """From each hold under load on but the first."""
-        since = (Variant(at=float(k), setting=str(k)) for k in facts.pushed[1:])
-        return tuple(replace(form, label=label, width=width) for form in since for label, width in GROWS)
+        """From each hold under load on but the first; what grows from there is a drift, at the last it only begins."""
+        since = [Variant(at=float(k), setting=str(k)) for k in facts.pushed[1:]]
+        begins, grows = (
+            [replace(form, label=label, width=width) for form in some]
+            for (label, width), some in zip(GROWS, (since, since[1:-1]), strict=True)
+        )
+        return (*begins, *grows)
 
     @staticmethod
     def course(variant: Variant, facts: Facts) -> Array:
@@ -154,8 +158,13 @@ FORMS: dict[str, Callable[[Array], Array]] = {"left": lambda u: 1.0 - u, "right"
 MOST = {"left": 1.0, "right": 1.0} | {label: wave.args[0] ** -2.0 for label, wave in WAVES.items()}
 """Forms of unknown moments along the cable, and how large each is beside the others."""
 
-PLACES = {"left": ("left",), "right": ("right",), "both": ("left", "right"), "along": (*WAVES,)}
-"""Where unknown moments act, and in which forms."""
+PLACES = {
+    "unnamed.left": ("left",),
+    "unnamed.right": ("right",),
+    "unnamed.both": ("left", "right"),
+    "unnamed.along": (*WAVES,),
+}
+"""Where unknown moments act, as it is told, and in which forms."""
 
 SIZES = (0.003, 0.01, 0.03)
 """Of the range of curvatures, their standard deviation: steps of a factor 3.3, over which a normal density hardly

@@ -63,7 +63,7 @@ def _moments(bench: Workbench, fitted: Fit) -> Message:
     place = next(place for place, some in PLACES.items() if {*some} == labels)
     return Message(
         MOMENTS.name,
-        place=Message(f"unnamed.{place}"),
+        place=Message(place),
         since=Message("unnamed.since", step=steps[first].step) if first else "",
         step=step.step,
         branch=step.branch,
