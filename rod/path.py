@@ -29,7 +29,17 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rod.characteristic import Array
-from rod.newton import PATH_STEPS, RESIDUAL_TOLERANCE, STEP_LIMIT, STEP_TOLERANCE, Outcome, Start, Trial, softest
+from rod.newton import (
+    BEYOND_NUMBERS,
+    PATH_STEPS,
+    RESIDUAL_TOLERANCE,
+    STEP_LIMIT,
+    STEP_TOLERANCE,
+    Outcome,
+    Start,
+    Trial,
+    softest,
+)
 from rod.reduction import Balance, System
 
 #: Longest and shortest step along the path, root mean square of the turns of the edges, rad.
@@ -127,6 +137,8 @@ class Ramp:
             move = step - self.product(step, normal, state) / along * rate
             largest = float(np.abs(move[:-3]).max())
             point = self.at(point.state + STEP_LIMIT / max(largest, STEP_LIMIT) * move)
+            if not self.system.misfit(point.balance) < BEYOND_NUMBERS:
+                return None
             if largest <= STEP_TOLERANCE and self.system.misfit(point.balance) <= RESIDUAL_TOLERANCE:
                 return point
         return None
