@@ -14,7 +14,6 @@ from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence, evidences
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
-from rod.inverse.extension import Extension
 from rod.inverse.fit import Fit
 from rod.inverse.prediction import Facts
 
@@ -67,19 +66,15 @@ def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:
     own = evidence(grid, found.fitted)[0]
     extension = found.fitted.extension
     unnamed = {cause: found_at[0] for cause in UNNAMED if (found_at := extension.terms_of(cause))}
-    terms = (term for term in extension.terms if term.cause not in unnamed and not np.isfinite(term.variant.known))
+    causes = [t.cause for t in extension.terms if t.cause not in unnamed and not np.isfinite(t.variant.known)]
     # all components of one thing are one choice
-    chosen = dict.fromkeys((term.cause, _whole(term.cause, extension) or term) for term in terms)
-    tried = sum(_kinds(cause, facts, whole=form is True) for cause, form in chosen)
+    whole = {cause for cause in causes if cause.whole and causes.count(cause) > 1}
+    tried = sum(_kinds(cause, facts, whole=False) for cause in causes if cause not in whole)
+    tried += sum(_kinds(cause, facts, whole=True) for cause in whole)
     if unnamed:
         chances = sum(float(np.log(cause.chance(extension.terms[k].variant, facts))) for cause, k in unnamed.items())
         return Hypothesis(found.causes, -np.inf, own.plain - tried + chances, found)
     return Hypothesis(found.causes, own.plain - tried, own.rest - tried, found)
-
-
-def _whole(cause: Cause, extension: Extension) -> bool:
-    """Whether all components of a cause that is one thing are in a model."""
-    return cause.whole and len(extension.terms_of(cause)) > 1
 
 
 def _kinds(cause: Cause, facts: Facts, *, whole: bool) -> float:
