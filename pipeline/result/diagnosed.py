@@ -19,9 +19,7 @@ class CauseForm(Part):
     label: str = Field("", description="in words, as it completes the cause's name")
     amount: Number = Field(description="in the cause's unit")
     std: Number = Field(description="of the amount, in the cause's unit")
-    at: Number = Field(
-        0.0, description="place in shares of the length, curvature in 1/m, time in s, direction in rad"
-    )
+    at: Number = Field(0.0, description="place in shares of the length, curvature in 1/m, time in s, direction in rad")
     width: Number = Field(
         0.0,
         description="of a spot, in shares of the length; of a steep tilt the square of the camera's distance, m^2, "
