@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from pipeline.intake.tomltable import Check, TomlFile, checked_table, flag, number, path_text
+from pipeline.intake.tomltable import Check, TomlFile, checked_table, flag, number, path_text, require
 from pipeline.messages import Message
 from pipeline.records import Finding, LoadStep, PhotoHints, inferred
 
@@ -53,33 +53,26 @@ def points(least: int, wanted: str, *, most: int = MOST_POINTS) -> Check:
     """At least so many different points, and no more than ``most``."""
 
     def check(value: Any) -> tuple[Point, ...]:
-        if not isinstance(value, list) or not least <= len(value) <= most:
-            raise ValueError(Message(wanted))
-        if any(not isinstance(point, list) or len(point) != 2 for point in value):
-            raise ValueError(Message(wanted))
+        require(isinstance(value, list) and least <= len(value) <= most, wanted)
+        require(all(isinstance(point, list) and len(point) == 2 for point in value), wanted)
         found = tuple((number(point[0]), number(point[1])) for point in value)
-        if len(set(found)) < least or max(abs(x) for point in found for x in point) > 1e6:
-            raise ValueError(Message("wanted.points", least=least, wanted=Message(wanted)))
+        plausible = len(set(found)) >= least and max(abs(x) for point in found for x in point) <= 1e6
+        require(plausible, "wanted.points", least=least, wanted=Message(wanted))
         return found
 
     return check
 
 
 def _region(value: Any) -> tuple[float, float, float, float]:
-    wanted = "wanted.region"
-    if not isinstance(value, list) or len(value) != 4:
-        raise ValueError(Message(wanted))
-    u0, v0, u1, v1 = (number(x) for x in value)
-    if not (u0 < u1 and v0 < v1):
-        raise ValueError(Message(wanted))
+    require(isinstance(value, list) and len(value) == 4, "wanted.region")
+    u0, v0, u1, v1 = map(number, value)
+    require(u0 < u1 and v0 < v1, "wanted.region")
     return u0, v0, u1, v1
 
 
 def _polygons(value: Any) -> tuple[tuple[Point, ...], ...]:
-    wanted = "wanted.polygons"
-    if not isinstance(value, list):
-        raise ValueError(Message(wanted))
-    return tuple(map(points(3, wanted), value))
+    require(isinstance(value, list), "wanted.polygons")
+    return tuple(map(points(3, "wanted.polygons"), value))
 
 
 CHECKS: dict[str, Check] = {

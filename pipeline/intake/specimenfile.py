@@ -26,6 +26,7 @@ from pipeline.intake.tomltable import (
     one_of,
     path_text,
     read_toml,
+    require,
     text,
     whole,
 )
@@ -166,8 +167,7 @@ def plain_name(name: str) -> str:
 def _identifier(value: Any) -> str:
     """An id becomes a folder name on any system."""
     name = text(value)
-    if len(name.encode()) > 120 or name[0] == "." or name[-1] == "." or any(_forbidden(char) for char in name):
-        raise ValueError(Message("wanted.name"))
+    require(len(name.encode()) <= 120 and name == name.strip(".") and not any(map(_forbidden, name)), "wanted.name")
     return name
 
 
@@ -176,10 +176,8 @@ def _forbidden(char: str) -> bool:
 
 
 def _board(value: Any) -> Board:
-    if not isinstance(value, dict) or not {"columns", "rows", "square_mm"} <= value.keys():
-        raise ValueError(Message("wanted.board"))
-    if not value.keys() <= {"columns", "rows", "square_mm", "charuco", "marker_mm"}:
-        raise ValueError(Message("wanted.board.keys"))
+    require(isinstance(value, dict) and {"columns", "rows", "square_mm"} <= value.keys(), "wanted.board")
+    require(value.keys() <= {"columns", "rows", "square_mm", "charuco", "marker_mm"}, "wanted.board.keys")
     side, count = number_in(0.1, 1000.0, "(mm)"), whole(2, 1000)
     return Board(
         columns=count(value["columns"]),
@@ -191,18 +189,15 @@ def _board(value: Any) -> Board:
 
 
 def _columns(value: Any) -> dict[str, str | int]:
-    if not isinstance(value, dict) or not value.keys() <= set(ROLES):
-        raise ValueError(Message("wanted.columns", roles=ROLES))
+    require(isinstance(value, dict) and value.keys() <= set(ROLES), "wanted.columns", roles=ROLES)
     position = whole(1, 1000)
     names = {role: position(name) if isinstance(name, int) else text(name) for role, name in value.items()}
-    if len(set(names.values())) < len(names):
-        raise ValueError(Message("wanted.columns.different", roles=ROLES))
+    require(len(set(names.values())) == len(names), "wanted.columns.different", roles=ROLES)
     return names
 
 
 def _units(value: Any) -> dict[str, str]:
-    if not isinstance(value, dict) or not value.keys() <= set(MEASURED):
-        raise ValueError(Message("wanted.units"))
+    require(isinstance(value, dict) and value.keys() <= set(MEASURED), "wanted.units")
     return {role: text(unit) for role, unit in value.items()}
 
 

@@ -7,7 +7,6 @@ one, because a misspelt key that is silently ignored costs a measurement. Used f
 from __future__ import annotations
 
 import difflib
-import math
 import re
 import tomllib
 from collections.abc import Callable, Collection, Mapping
@@ -142,12 +141,16 @@ def shown(value: Any) -> str:
 # Checks: value -> value; a ValueError holds the message of what is wanted, as the object of "give ...".
 
 
+def require(met: bool, wanted: str, /, **values: object) -> None:
+    """Say what is wanted where a condition is not met."""
+    if not met:
+        raise ValueError(Message(wanted, **values))
+
+
 def number(value: Any) -> float:
     """A finite number."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(Message("wanted.number"))
-    if abs(value) > 1e300 or not math.isfinite(value):  # compares integers too large for a float as well
-        raise ValueError(Message("wanted.finite"))
+    require(isinstance(value, int | float) and not isinstance(value, bool), "wanted.number")
+    require(abs(value) <= 1e300, "wanted.finite")  # compares integers too large for a float as well
     return float(value)
 
 
@@ -156,8 +159,7 @@ def number_in(low: float, high: float, unit: str) -> Check:
 
     def check(value: Any) -> float:
         given = number(value)
-        if not low <= given <= high:
-            raise ValueError(Message("wanted.range", low=low, high=high, unit=unit))
+        require(low <= given <= high, "wanted.range", low=low, high=high, unit=unit)
         return given
 
     return check
@@ -167,39 +169,35 @@ def whole(low: int, high: int) -> Check:
     """An integer within a range."""
 
     def check(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise ValueError(Message("wanted.whole", low=low, high=high))
-        return value
+        is_whole = isinstance(value, int) and not isinstance(value, bool)
+        require(is_whole and low <= value <= high, "wanted.whole", low=low, high=high)
+        return int(value)
 
     return check
 
 
 def flag(value: Any) -> bool:
     """True or false."""
-    if not isinstance(value, bool):
-        raise ValueError(Message("wanted.flag"))
-    return value
+    require(isinstance(value, bool), "wanted.flag")
+    return bool(value)
 
 
 def text(value: Any) -> str:
     """A text that is not empty."""
-    if not isinstance(value, str) or not value.strip():
-        raise ValueError(Message("wanted.text"))
-    return value.strip()
+    require(isinstance(value, str) and bool(value.strip()), "wanted.text")
+    return str(value.strip())
 
 
 def path_text(value: Any) -> str:
     """A text that can name a file."""
     name = text(value)
-    if len(name) > LONGEST_PATH:
-        raise ValueError(Message("wanted.path", most=LONGEST_PATH))
+    require(len(name) <= LONGEST_PATH, "wanted.path", most=LONGEST_PATH)
     return name
 
 
 def free_text(value: Any) -> str:
     """Anything a person may write as a note: texts, numbers, dates."""
-    if isinstance(value, dict | list) or (isinstance(value, int) and abs(value) > 1e300):
-        raise ValueError(Message("wanted.text"))
+    require(not isinstance(value, dict | list) and not (isinstance(value, int) and abs(value) > 1e300), "wanted.text")
     return str(value)
 
 
@@ -207,8 +205,7 @@ def one_of(*choices: str) -> Check:
     """One of a few words."""
 
     def check(value: Any) -> str:
-        if value not in choices:
-            raise ValueError(Message("wanted.one-of", choices=[f'"{choice}"' for choice in choices]))
+        require(value in choices, "wanted.one-of", choices=[f'"{choice}"' for choice in choices])
         return str(value)
 
     return check

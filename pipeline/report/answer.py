@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.report.page import band_width
 from pipeline.report.words import Words
 from pipeline.result import Result, leading, set_aside, trusted
 from pipeline.result.answer import refusal
 from pipeline.result.headline import opening
 from pipeline.rounding import p_value
-from pipeline.settings import ReportSettings
 
 TONES = {"adequate": "good", "named": "warn", "class": "warn", "two_causes": "warn"}
 
@@ -51,7 +49,7 @@ class FirstScreen:
     doubt: str = ""
 
 
-def first_screen(result: Result, words: Words, settings: ReportSettings) -> FirstScreen:
+def first_screen(result: Result, words: Words) -> FirstScreen:
     """The answer of a result in the language of the words."""
     diagnosis = result.diagnosis
     if result.status == "failed":
@@ -74,7 +72,7 @@ def first_screen(result: Result, words: Words, settings: ReportSettings) -> Firs
             for way, (value, std) in pre_curvatures(result).items()
             if result.answer.usable or result.status == "failed"
         ),
-        hidden=_hidden(result, words, settings),
+        hidden=_hidden(result, words),
         doubt=words("band_unexplained") if diagnosis and diagnosis.verdict == "unexplained" else "",
     )
 
@@ -83,12 +81,12 @@ MOST_HIDDEN = 3
 """Lines on the first screen; all blind spots stand with the diagnosis."""
 
 
-def _hidden(result: Result, words: Words, settings: ReportSettings) -> tuple[str, ...]:
+def _hidden(result: Result, words: Words) -> tuple[str, ...]:
     """Blind spots that would move f_EI, at a plausible size, farther than its band reaches; the worst first."""
     curve, diagnosis = result.answer.curve, result.diagnosis
     if curve is None or diagnosis is None or not result.answer.usable:
         return ()
-    band = band_width(settings) * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
+    band = words.half_band * float(np.mean(curve.tangent_std / np.abs(curve.tangent)))
     worst = sorted(diagnosis.could_hide, key=lambda spot: -abs(spot.stiffness_bias_at_plausible_size))[:MOST_HIDDEN]
     beyond = (spot for spot in worst if abs(spot.stiffness_bias_at_plausible_size) > band)
     return tuple(words.blind_spot("hidden_row", spot) for spot in beyond)

@@ -27,6 +27,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from pipeline.report.page import PALETTE
 from pipeline.report.ruling import FONT, Ruling, rule, text_width
+from pipeline.report.words import Words
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -169,11 +170,11 @@ def label_width(labels: Iterable[str], *, most: float) -> float:
     return min(most, float(STYLE["font.size"]) * max(map(text_width, labels), default=0.0) + LABEL_GAP)
 
 
-def finish(axes: Axes, *, x: str | Ruling, y: str | Ruling, decimal: str, legend: int = 0) -> Axes:
+def finish(axes: Axes, words: Words, *, x: str | Ruling, y: str | Ruling, legend: int = 0) -> Axes:
     """Rule the axes with names, units and the reader's number format, put the legend above; their limits are final."""
     axes.apply_aspect()
-    rule(axes, "bottom", Ruling(x) if isinstance(x, str) else x, decimal=decimal)
-    rule(axes, "left", Ruling(y) if isinstance(y, str) else y, decimal=decimal)
+    rule(axes, "bottom", Ruling(x) if isinstance(x, str) else x, decimal=words.decimal)
+    rule(axes, "left", Ruling(y) if isinstance(y, str) else y, decimal=words.decimal)
     if legend:
         many: dict[str, float] = {"handlelength": 1.1, "columnspacing": 0.9, "handletextpad": 0.4}
         spacing = many if legend > 4 else {"columnspacing": 1.4}

@@ -11,7 +11,6 @@ from pipeline.report.canvas import Drawing, drawing
 from pipeline.report.evidence import residual_map, titled
 from pipeline.report.words import Words
 from pipeline.result import CauseRow, DiagnosisPart, NextExperiment, ResidualMap, Result, TwinPart
-from pipeline.settings import ReportSettings
 
 # A probability or share is worth two digits: studies of hundreds of specimens do not know it better.
 SHARE_DIGITS = 2
@@ -48,9 +47,7 @@ class DiagnosisView:
         return bool(self.rows or self.figures or self.blind_spots or self.leftover or self.next_what)
 
 
-def diagnosis_view(
-    result: Result, words: Words, settings: ReportSettings, *, figures: bool = True
-) -> DiagnosisView | None:
+def diagnosis_view(result: Result, words: Words, *, figures: bool = True) -> DiagnosisView | None:
     """Everything the page says about the diagnosis, its figures only if asked for; None if there is none to be used."""
     part = result.diagnosis
     if part is None or not result.answer.usable:
@@ -67,7 +64,7 @@ def diagnosis_view(
         next_what=words.said(following.said).sentence if following else "",
         next_separates=_separates(following, words) if following else "",
         leftover=_leftover(part, words),
-        figures=_figures(result, part, words, settings) if figures else {},
+        figures=_figures(result, part, words) if figures else {},
     )
 
 
@@ -194,7 +191,7 @@ LIKELY = 0.5
 """Probability of something else from which its place and pattern are told: below, they mean nothing."""
 
 
-def _figures(result: Result, part: DiagnosisPart, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
+def _figures(result: Result, part: DiagnosisPart, words: Words) -> dict[str, Drawing]:
     """Ranking, cosines, maps before and after."""
     drawn: dict[str, Drawing] = {}
     if part.table:
@@ -206,7 +203,7 @@ def _figures(result: Result, part: DiagnosisPart, words: Words, settings: Report
     before, after = part.residuals_before, part.residuals_after
     # where the extended model does not answer, the map among the mechanics is the one before
     if before is not None and after is not None and result.answer.method == "extended":
-        drawn.update(_before_and_after(before, after, words, settings))
+        drawn.update(_before_and_after(before, after, words))
     pattern = part.leftover
     if pattern is not None and part.verdict != "adequate" and pattern.probability >= LIKELY and any(pattern.shape_m):
         left = partial(maps.draw_leftover, s_m=pattern.s_m, shape_m=pattern.shape_m, words=words)
@@ -215,11 +212,9 @@ def _figures(result: Result, part: DiagnosisPart, words: Words, settings: Report
     return drawn
 
 
-def _before_and_after(
-    before: ResidualMap, after: ResidualMap, words: Words, settings: ReportSettings
-) -> dict[str, Drawing]:
+def _before_and_after(before: ResidualMap, after: ResidualMap, words: Words) -> dict[str, Drawing]:
     """What was left of shapes before the extension, and of forces before and after."""
-    drawn = {"before": residual_map("map-before", before, words, settings, title="fig_map_before")}
+    drawn = {"before": residual_map("map-before", before, words, title="fig_map_before")}
     if any(value is not None for value in before.force_sigma):
         draw = partial(maps.draw_force_rest, before=before, after=after, words=words)
         texts = _force_texts(before, after, words)

@@ -45,8 +45,8 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
     settings : ReportSettings, optional
     """
     settings = settings or ReportSettings()
-    words = Words(settings.language)
-    main, diagnosis = main_figure(result, words, settings), diagnosis_view(result, words, settings)
+    words = Words.of(settings)
+    main, diagnosis = main_figure(result, words), diagnosis_view(result, words)
     levels = {level: [f for f in result.findings if f.level == level] for level in ("error", "warning", "info")}
     return (
         environment()
@@ -54,8 +54,7 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
         .render(
             result=result,
             words=words,
-            settings=settings,
-            answer=first_screen(result, words, settings),
+            answer=first_screen(result, words),
             main=main,
             aside=_aside(result, words),
             map_note=map_note(result, words),
@@ -63,11 +62,11 @@ def report_html(result: Result, settings: ReportSettings | None = None) -> str:
                 "photos": bool(result.photos) or result.status != "failed",
                 "diagnosis": diagnosis is not None and diagnosis.examined,
             },
-            pointer=pointer_data(result, main, words, settings),
+            pointer=pointer_data(result, main, words),
             levels=levels,
-            photos=photo_views(result, words, settings),
+            photos=photo_views(result, words),
             photos_note=photos_note(result, words),
-            figures=mechanics_figures(result, words, settings),
+            figures=mechanics_figures(result, words),
             diagnosis=diagnosis,
             tables={
                 "forces": force_rows(result, words),

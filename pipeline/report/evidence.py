@@ -16,12 +16,10 @@ from matplotlib.axes import Axes
 from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Area, Drawing, drawing
 from pipeline.report.curves import seen_range
-from pipeline.report.page import band_width
 from pipeline.report.words import Said, Words
 from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result, curves, set_aside, trusted
 from pipeline.rounding import digits
-from pipeline.settings import ReportSettings
-from pipeline.units import Unit, suited
+from pipeline.units import Unit
 
 Size = tuple[float, float]
 TALL = (400.0, 350.0)
@@ -45,7 +43,7 @@ class PhotoView:
     kappa: Drawing | None
 
 
-def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawing | None:
+def main_figure(result: Result, words: Words) -> Drawing | None:
     """The figure of f_EI by every way; None where no way gave any."""
     parts = trusted(result)
     if not parts:
@@ -62,16 +60,16 @@ def main_figure(result: Result, words: Words, settings: ReportSettings) -> Drawi
     ]
     read = " ".join(Said(line, words.language).sentence for line in lines)
     low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
-    draw = partial(figures.draw_characteristic, result=result, words=words, settings=settings)
+    draw = partial(figures.draw_characteristic, result=result, words=words)
     ends = {"low": words.curvature(low), "high": words.curvature(high)}
     return titled("characteristic", draw, words, size=(420.0, 310.0), lines=read, **ends)
 
 
-def pointer_data(result: Result, main: Drawing | None, words: Words, settings: ReportSettings) -> dict[str, object]:
+def pointer_data(result: Result, main: Drawing | None, words: Words) -> dict[str, object]:
     """What the page needs to answer a pointer over the main figure: frame, values, bands, supporting photos."""
     if main is None:
         return {}
-    unit, half, aside = figures.stiffness_unit(result, words), band_width(settings), set_aside(result)
+    unit, half, aside = figures.stiffness_unit(result, words), words.half_band, set_aside(result)
     ways = [
         {
             "method": method,
@@ -104,10 +102,10 @@ def titled(
     return drawing(name, draw, size=size, title=words(said), description=words(f"{said}_alt", **alt))
 
 
-def mechanics_figures(result: Result, words: Words, settings: ReportSettings) -> dict[str, Drawing]:
+def mechanics_figures(result: Result, words: Words) -> dict[str, Drawing]:
     """Forces, moment curve, curvatures of all photos, pointwise graph and residual map, as far as there are data."""
     drawn: dict[str, Drawing] = {}
-    how: dict[str, Any] = {"result": result, "words": words, "settings": settings}
+    how: dict[str, Any] = {"result": result, "words": words}
     if result.steps:
         drawn["forces"] = titled("forces", partial(figures.draw_forces, **how), words, size=TALL)
     if curves(result):
@@ -122,13 +120,11 @@ def mechanics_figures(result: Result, words: Words, settings: ReportSettings) ->
         drawn["pointwise"] = titled("pointwise", partial(figures.draw_pointwise, **how), words)
     residuals = maps.answer_map(result)
     if residuals is not None:
-        drawn["map"] = residual_map("residual-map", residuals, words, settings)
+        drawn["map"] = residual_map("residual-map", residuals, words)
     return drawn
 
 
-def residual_map(
-    name: str, residuals: ResidualMap, words: Words, settings: ReportSettings, *, title: str = "fig_map"
-) -> Drawing:
+def residual_map(name: str, residuals: ResidualMap, words: Words, *, title: str = "fig_map") -> Drawing:
     """The figure of a residual map, high enough for its steps."""
     return drawing(
         name,
@@ -147,7 +143,7 @@ def map_note(result: Result, words: Words) -> str:
     stds = [abs(left / sigma) for left, sigma in pairs if left is not None and sigma]
     if not stds:
         return words("fig_map_note")
-    size = suited(stds, "m", decimal=words.decimal).plain(float(np.median(stds)), 2)
+    size = words.unit("m", *stds).plain(float(np.median(stds)), 2)
     return f"{words('fig_map_note')} {words('fig_map_scale', size=size)}"
 
 
@@ -161,17 +157,17 @@ def map_rms(residuals: ResidualMap, words: Words) -> str:
     return "; ".join(texts)
 
 
-def photo_views(result: Result, words: Words, settings: ReportSettings) -> list[PhotoView]:
+def photo_views(result: Result, words: Words) -> list[PhotoView]:
     """All photos in the order of the test."""
-    return [_photo_view(index, photo, words, settings) for index, photo in enumerate(maps.photos_of_answer(result))]
+    return [_photo_view(index, photo, words) for index, photo in enumerate(maps.photos_of_answer(result))]
 
 
-def _photo_view(index: int, photo: PhotoPart, words: Words, settings: ReportSettings) -> PhotoView:
+def _photo_view(index: int, photo: PhotoPart, words: Words) -> PhotoView:
     seen, hidden = photos.overlay_paths(photo)
     kappa, seen_kappa = None, seen_range(photo)
     if len(photo.s_m) > 1:
         low, high = seen_kappa or (min(photo.kappa_per_m), max(photo.kappa_per_m))
-        draw = partial(photos.draw_photo_curvature, photo=photo, words=words, settings=settings)
+        draw = partial(photos.draw_photo_curvature, photo=photo, words=words)
         ends = {"low": words.curvature(low), "high": words.curvature(high)}
         kappa = titled(f"kappa-{index}", draw, words, key="kappa", size=TALL, **ends)
     told, marks = words.after_colon(photo.said) if photo.reason else "", photos.bearing_marks(photo)

@@ -7,19 +7,18 @@ positive), displacement in mm. Bands hold the share of normal errors named in th
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from pipeline.report.canvas import DASHES, LIGHT, NOISE, ONE_ROW, Area, finish, plot_area, step_colours
-from pipeline.report.page import band_width
+from pipeline.report.maps import extended_map
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
 from pipeline.result import Result, StepPart, Visited, curves, set_aside, trusted, visited
-from pipeline.settings import ReportSettings
-from pipeline.units import Unit, suited
+from pipeline.units import Unit
 
 MARKERS = {"mounted": "D", "loading": "o", "unloading": "s"}
 # Pointwise ratios are 0/0 at mid-span and at the ends; beyond twice the curve they only squeeze what can be read.
@@ -30,7 +29,7 @@ SET_ASIDE = "set-aside"
 
 def stiffness_unit(result: Result, words: Words) -> Unit:
     """Unit of bending stiffness for all of a report: that of what is drawn in full."""
-    return suited((v for curve in _drawn(result) for v in curve.tangent), "N m²", decimal=words.decimal)
+    return words.unit("N m²", *(v for curve in _drawn(result) for v in curve.tangent))
 
 
 def _drawn(result: Result) -> list[Visited]:
@@ -40,10 +39,10 @@ def _drawn(result: Result) -> list[Visited]:
 
 def force_unit(result: Result, words: Words) -> Unit:
     """Unit of force for all of a report."""
-    return suited((step.force_N for step in result.steps), "N", decimal=words.decimal)
+    return words.unit("N", *(step.force_N for step in result.steps))
 
 
-def draw_characteristic(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_characteristic(figure: Area, result: Result, words: Words) -> Axes:
     """Draw f_EI: the answer with its band in front, others behind, those that are set aside faint and without a band.
 
     What was never visited is shaded.
@@ -64,8 +63,7 @@ def draw_characteristic(figure: Area, result: Result, words: Words, settings: Re
             name, look = words(f"way_{method}"), {"color": LIGHT[method], "ls": DASHES[method], "gid": SET_ASIDE}
             axes.plot(curve.kappa, unit.factor * curve.tangent, lw=1.2, alpha=0.45, label=name, **look)
         else:
-            front = 1.0 if method == answering else 0.0
-            _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, method, unit, words, settings, front=front)
+            _banded(axes, curve, unit, words, front=1.0 if method == answering else 0.0)
     if result.inverse and "inverse" in parts and "inverse" not in aside:
         knots = [k for k in result.inverse.knots if low <= k.kappa_per_m <= high]
         axes.plot(
@@ -78,8 +76,7 @@ def draw_characteristic(figure: Area, result: Result, words: Words, settings: Re
             mec=LIGHT["inverse"],
         )
     axes.set_xlim(left, high + margin)
-    bottom, top = _limits(counted, band_width(settings))
-    axes.set_ylim(unit.factor * bottom, unit.factor * top)
+    _limit(axes, counted, unit, words)
     _over_kappa(axes, "axis_stiffness", unit, words)
     _mark_legend(axes)
     return axes
@@ -88,7 +85,7 @@ def draw_characteristic(figure: Area, result: Result, words: Words, settings: Re
 def _over_kappa(axes: Axes, quantity: str, unit: Unit, words: Words) -> Axes:
     """Rule and name the axes of a figure over the curvature, its legend above."""
     name = words(quantity, unit=unit.symbol)
-    return finish(axes, x=words("axis_kappa"), y=name, decimal=words.decimal, legend=2)
+    return finish(axes, words, x=words("axis_kappa"), y=name, legend=2)
 
 
 def _mark_legend(axes: Axes) -> None:
@@ -101,40 +98,39 @@ def _mark_legend(axes: Axes) -> None:
             text.set_gid(SET_ASIDE)
 
 
-def _limits(parts: Iterable[Visited], half: float) -> tuple[float, float]:
+def _limit(axes: Axes, parts: Collection[Visited], unit: Unit, words: Words) -> None:
     """Limits of f_EI: all curves that count fit; one that is set aside may leave the picture."""
-    parts = tuple(parts)
+    half = words.half_band
     top = max(float(np.max(c.tangent + np.minimum(half * c.tangent_std, np.abs(c.tangent)))) for c in parts)
     lowest = min(0.0, *(float(np.min(curve.tangent)) for curve in parts))
-    return max(1.1 * lowest, -0.25 * top), 1.08 * top
+    axes.set_ylim(unit.factor * max(1.1 * lowest, -0.25 * top), unit.factor * (1.08 * top))
 
 
 def _banded(
     axes: Axes,
-    kappa: np.ndarray,
-    value: np.ndarray,
-    std: np.ndarray,
-    method: str,
+    curve: Visited,
     unit: Unit,
     words: Words,
-    settings: ReportSettings,
     *,
+    quantity: str = "tangent",
+    role: str = "",
     front: float = 0.0,
     label: str = "",
 ) -> None:
-    """A curve of one way with its band, in its colour and dash; one with a larger ``front`` covers others."""
-    half = band_width(settings) * std
+    """A curve with its band, in colour and dash of its way or ``role``; one with a larger ``front`` covers others."""
+    role = role or curve.method
+    value, half = getattr(curve, quantity), words.half_band * getattr(curve, f"{quantity}_std")
     low, high = unit.factor * (value - half), unit.factor * (value + half)
-    axes.fill_between(kappa, low, high, color=LIGHT[method], alpha=0.2, lw=0.0, zorder=1.0 + front)
-    look: dict[str, Any] = {"color": LIGHT[method], "ls": DASHES[method], "zorder": 2.0 + front}
-    look |= {"lw": 3.0} if method == "extended" else {}
-    axes.plot(kappa, unit.factor * value, label=label or words(f"way_{method}"), **look)
+    axes.fill_between(curve.kappa, low, high, color=LIGHT[role], alpha=0.2, lw=0.0, zorder=1.0 + front)
+    look: dict[str, Any] = {"color": LIGHT[role], "ls": DASHES[role], "zorder": 2.0 + front}
+    look |= {"lw": 3.0} if role == "extended" else {}
+    axes.plot(curve.kappa, unit.factor * value, label=label or words(f"way_{role}"), **look)
 
 
-def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_moment(figure: Area, result: Result, words: Words) -> Axes:
     """Draw m(kappa) by every way, with the points m = P y of the balance equations."""
     axes, parts = plot_area(figure), trusted(result)
-    unit = suited((v for curve in _drawn(result) for v in curve.moment), "N m", decimal=words.decimal)
+    unit = words.unit("N m", *(v for curve in _drawn(result) for v in curve.moment))
     if result.balance and result.balance.points_kappa_per_m:
         count = len(result.balance.points_kappa_per_m)
         chosen = slice(None, None, max(1, count // 300))  # more points than that only fill the picture
@@ -148,8 +144,8 @@ def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSett
             alpha=0.7,
             label=words("points_balance"),
         )
-    for method, curve in parts.items():
-        _banded(axes, curve.kappa, curve.moment, curve.moment_std, method, unit, words, settings)
+    for curve in parts.values():
+        _banded(axes, curve, unit, words, quantity="moment")
     ends = [end for curve in parts.values() for end in (curve.kappa[0], curve.kappa[-1])]
     if ends:  # single points of a photo may lie anywhere
         margin = 0.08 * (max(ends) - min(ends))
@@ -158,7 +154,7 @@ def draw_moment(figure: Area, result: Result, words: Words, settings: ReportSett
     return _over_kappa(axes, "axis_moment", unit, words)
 
 
-def draw_pointwise(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_pointwise(figure: Area, result: Result, words: Words) -> Axes:
     """Draw the paper's (kappa, f_EI)-graph, Eq. (14) point by point and photo by photo, under the balance curve."""
     axes, unit = plot_area(figure), stiffness_unit(result, words)
     pointwise = result.balance.pointwise if result.balance else []
@@ -168,7 +164,7 @@ def draw_pointwise(figure: Area, result: Result, words: Words, settings: ReportS
         axes.plot(part.kappa_per_m, values, ls="none", marker=".", ms=3.5, color=colour, label=label)
     curve = curves(result).get("balance")
     if curve is not None:
-        _banded(axes, curve.kappa, curve.tangent, curve.tangent_std, "balance", unit, words, settings)
+        _banded(axes, curve, unit, words)
         lowest, highest = (unit.factor * float(value) for value in (curve.tangent.min(), curve.tangent.max()))
         axes.set_ylim(min(0.0, lowest), POINTWISE_HEADROOM * highest)
     return _over_kappa(axes, "axis_stiffness", unit, words)
@@ -180,31 +176,26 @@ def fitted_branches(result: Result) -> dict[str, Visited]:
     return {name: part for name in fitted if (part := visited("inverse", fitted[name])) is not None}
 
 
-def draw_branches(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_branches(figure: Area, result: Result, words: Words) -> Axes:
     """Draw f_EI fitted to loading and to unloading apart; at least one of them has a visited part."""
-    axes, unit, half = plot_area(figure, top=ONE_ROW), stiffness_unit(result, words), band_width(settings)
-    parts = fitted_branches(result)
-    for colour, (name, curve) in zip(("inverse", "balance"), parts.items(), strict=False):
-        told = (curve.kappa, curve.tangent, curve.tangent_std)
-        _banded(axes, *told, colour, unit, words, settings, label=words.known(f"branch_{name}", name))
-    bottom, top = _limits(parts.values(), half)
-    axes.set_ylim(unit.factor * bottom, unit.factor * top)
+    axes, unit, parts = plot_area(figure, top=ONE_ROW), stiffness_unit(result, words), fitted_branches(result)
+    for role, (name, curve) in zip(("inverse", "balance"), parts.items(), strict=False):
+        _banded(axes, curve, unit, words, role=role, label=words.known(f"branch_{name}", name))
+    _limit(axes, parts.values(), unit, words)
     return _over_kappa(axes, "axis_stiffness", unit, words)
 
 
 def steps_of_answer(result: Result) -> list[StepPart]:
     """The steps with the force of the model that answers: the extended one, else the fitted simulation."""
-    extended = None if result.diagnosis is None else result.diagnosis.residuals_after
-    if extended is None or result.answer.method != "extended":
-        return result.steps
-    left = dict(zip(extended.steps, extended.force_N, strict=False))
+    extended = extended_map(result)
+    left = dict(zip(extended.steps, extended.force_N, strict=False)) if extended else {}
     return [
         step if (rest := left.get(step.step)) is None else step.model_copy(update={"force_fit_N": step.force_N - rest})
         for step in result.steps
     ]
 
 
-def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSettings) -> Axes:
+def draw_forces(figure: Area, result: Result, words: Words) -> Axes:
     """Draw measured and simulated force over the displacement, and what is left between them in sigma."""
     height, unit, given = figure.bbox.height, force_unit(result, words), steps_of_answer(result)
     fitted = [step for step in given if step.force_fit_N is not None]
@@ -212,7 +203,7 @@ def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSett
     for branch in MARKERS:
         steps = [step for step in given if step.branch == branch]
         if steps:
-            _branch(axes, branch, steps, unit, band_width(settings), words)
+            _branch(axes, branch, steps, unit, words)
     under = Ruling(labelled=False) if fitted else Ruling(words("axis_displacement"))
     if fitted:
         role = "extended" if result.answer.method == "extended" else "inverse"
@@ -220,7 +211,7 @@ def draw_forces(figure: Area, result: Result, words: Words, settings: ReportSett
         rest = plot_area(figure, top=0.68 * height)
         rest.set_xlim(axes.get_xlim())
         _force_rest(rest, given, words)
-    finish(axes, x=under, y=words("axis_force", unit=unit.symbol), decimal=words.decimal, legend=2)
+    finish(axes, words, x=under, y=words("axis_force", unit=unit.symbol), legend=2)
     return axes
 
 
@@ -252,7 +243,7 @@ def _force_rest(rest: Axes, given: list[StepPart], words: Words) -> None:
     limit = max([1.5 * NOISE, *(1.15 * abs(force_residual(step) or 0.0) for step in given)])
     rest.set_ylim(-limit, limit)
     sigma = Ruling(words("axis_sigma"), most=4, whole=True)
-    finish(rest, x=words("axis_displacement"), y=sigma, decimal=words.decimal)
+    finish(rest, words, x=words("axis_displacement"), y=sigma)
 
 
 def _marks(branch: str) -> dict[str, Any]:
@@ -266,12 +257,12 @@ def _marks(branch: str) -> dict[str, Any]:
     }
 
 
-def _branch(axes: Axes, branch: str, steps: list[StepPart], unit: Unit, half: float, words: Words) -> None:
+def _branch(axes: Axes, branch: str, steps: list[StepPart], unit: Unit, words: Words) -> None:
     """Measured forces of one branch with error bars."""
     axes.errorbar(
         [1e3 * step.displacement_m for step in steps],
         [unit.factor * step.force_N for step in steps],
-        yerr=[unit.factor * half * step.force_std_N for step in steps],
+        yerr=[unit.factor * words.half_band * step.force_std_N for step in steps],
         capsize=3.0,
         elinewidth=1.2,
         label=words.known(f"branch_{branch}", branch),
@@ -306,5 +297,5 @@ def draw_curvatures(figure: Area, result: Result, words: Words) -> Axes:
         axes.plot(1e3 * np.asarray(photo.s_m), kappa, color=colour, lw=1.6, label=label)
     if len(traced) > 10:
         axes.set_title(words("steps_dark_to_bright"), loc="left")
-    finish(axes, x=words("axis_s"), y=words("axis_kappa"), decimal=words.decimal, legend=10 if len(traced) <= 10 else 0)
+    finish(axes, words, x=words("axis_s"), y=words("axis_kappa"), legend=10 if len(traced) <= 10 else 0)
     return axes

@@ -24,7 +24,7 @@ from pipeline.intake.photos import natural_key
 from pipeline.messages import Message
 from pipeline.report.cells import csv_lines
 from pipeline.report.files import write_atomic
-from pipeline.report.page import asset, band_width, environment, palette_css, unbroken
+from pipeline.report.page import asset, environment, palette_css, unbroken
 from pipeline.report.repeats import Repeats, repeats, without_outlying
 from pipeline.report.words import Words
 from pipeline.result import SCHEMA, FindingPart, Result, SpecimenPart, read_result
@@ -32,7 +32,7 @@ from pipeline.result.diagnosed import CAUSES_NAMED
 from pipeline.result.row import SHAPE_SIZE, STATUSES, IndexRow, from_entry, index_row
 from pipeline.rounding import digits
 from pipeline.settings.report import ReportSettings
-from pipeline.units import Unit, suited
+from pipeline.units import Unit
 
 BLOCK = 100
 """Rows that stand in the page as they are; all others are drawn as the reader scrolls to them, as many at a time."""
@@ -119,9 +119,9 @@ def report_of(result: Result, folder: str, out: Path, settings: ReportSettings) 
 
 def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     """Text of ``index.html``, piece by piece: data of ten thousand rows are long."""
-    words = Words(settings.language)
+    words = Words.of(settings)
     means = [float(np.mean(row.curve.tangent)) for row in rows if row.curve and row.usable]
-    unit = suited((float(np.median(means)) if means else 0.0,), "N m²", decimal=words.decimal)
+    unit = words.unit("N m²", float(np.median(means)) if means else 0.0)
     count = {status: sum(row.status == status for row in rows) for status in STATUSES}
     unusable = sum(row.state == "unusable" for row in rows)
     pooled = list(repeats(rows, unit, words))
@@ -148,7 +148,7 @@ def index_html(rows: list[IndexRow], settings: ReportSettings) -> Iterator[str]:
     before, _, after = page.rpartition(CURVES)  # a name may hold anything, and names stand before
     before, _, between = before.rpartition(DATA)
     yield before
-    yield from _data(rows, pooled, unit, words, settings)
+    yield from _data(rows, pooled, unit, words)
     yield between
     yield from _list_of(_curve(row, unit) for row in rows)
     yield after
@@ -190,14 +190,12 @@ def _causes(row: IndexRow, words: Words) -> str:
     return f" {words('or')} ".join((named, *(words.cause(name) for name in row.twins)))
 
 
-def _data(
-    rows: list[IndexRow], pooled: list[Repeats], unit: Unit, words: Words, settings: ReportSettings
-) -> Iterator[str]:
+def _data(rows: list[IndexRow], pooled: list[Repeats], unit: Unit, words: Words) -> Iterator[str]:
     """The data of the page as JSON: first what belongs to all rows, then the cells of every row."""
     whole = {
         "axes": [words("axis_kappa"), words("axis_stiffness", unit=unit.symbol)],
         "decimal": words.decimal,
-        "half": band_width(settings),
+        "half": words.half_band,
         "block": BLOCK,
         "typed": any(row.type for row in rows),
         "size": SHAPE_SIZE,

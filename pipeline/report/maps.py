@@ -18,7 +18,6 @@ from pipeline.report.canvas import LIGHT, NOISE, ONE_ROW, Area, finish, label_wi
 from pipeline.report.ruling import Ruling, rule
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart, ResidualMap, Result
-from pipeline.units import suited
 
 Array = NDArray[np.float64]
 # More names than this on an axis cannot be annotated at 440 px.
@@ -50,10 +49,14 @@ def measured_map(result: Result) -> ResidualMap | None:
     )
 
 
+def extended_map(result: Result) -> ResidualMap | None:
+    """Residual map of the extended model, if that is what answers."""
+    return result.diagnosis.residuals_after if result.diagnosis and result.answer.method == "extended" else None
+
+
 def answer_map(result: Result) -> ResidualMap | None:
     """Residual map of the model that answers: the extended one, else the fitted simulation as the photos hold it."""
-    extended = None if result.diagnosis is None else result.diagnosis.residuals_after
-    return extended if extended is not None and result.answer.method == "extended" else measured_map(result)
+    return extended_map(result) or measured_map(result)
 
 
 def photos_of_answer(result: Result) -> list[PhotoPart]:
@@ -111,7 +114,7 @@ def draw_map(figure: Area, residuals: ResidualMap, words: Words, *, title: str =
     every = max(1, len(residuals.steps) // 12)
     steps = Ruling(at=tuple(range(0, len(names), every)), labels=tuple(names[::every]), grid=False)
     along = Ruling(words("axis_s"), most=6 if width > NARROW else 3, grid=False)
-    finish(axes, x=along, y=steps, decimal=words.decimal)
+    finish(axes, words, x=along, y=steps)
     axes.set_title(title, loc="left")
     _scale(figure, axes, image, words("axis_sigma"), words)
     return axes
@@ -127,15 +130,15 @@ def draw_force_rest(figure: Area, before: ResidualMap, after: ResidualMap, words
             values = _numbers(residuals.force_sigma)
             axes.plot(range(values.size), values, color=LIGHT[role], marker=marker, lw=0.8, label=words(label))
     steps = Ruling(words("step"), at=tuple(range(len(before.steps))), labels=tuple(map(str, before.steps)))
-    return finish(axes, x=steps, y=words("axis_sigma"), decimal=words.decimal, legend=2)
+    return finish(axes, words, x=steps, y=words("axis_sigma"), legend=2)
 
 
 def draw_leftover(figure: Area, s_m: list[float], shape_m: list[float], words: Words) -> Axes:
     """Draw the pattern of what no cause explains, along the cable."""
-    axes, unit = plot_area(figure, top=8.0), suited(shape_m, "m", decimal=words.decimal)
+    axes, unit = plot_area(figure, top=8.0), words.unit("m", *shape_m)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     axes.plot(1e3 * np.asarray(s_m), unit.factor * np.asarray(shape_m), color=LIGHT["alarm"])
-    return finish(axes, x=words("axis_s"), y=words("axis_residual", unit=unit.symbol), decimal=words.decimal)
+    return finish(axes, words, x=words("axis_s"), y=words("axis_residual", unit=unit.symbol))
 
 
 def _numbers(row: list[float | None]) -> Array:
@@ -164,7 +167,7 @@ def draw_cosines(figure: Area, cosines: dict[str, dict[str, float]], words: Word
     table = np.array([[_cosine(cosines, a, b) for b in names] for a in names])
     image = axes.imshow(np.ma.masked_invalid(table), cmap="cividis", vmin=0.0, vmax=1.0, aspect="auto")
     causes = Ruling(at=tuple(range(len(names))), labels=tuple(labels), grid=False, mark=0.0)
-    finish(axes, x=replace(causes, lean=40.0), y=causes, decimal=words.decimal)
+    finish(axes, words, x=replace(causes, lean=40.0), y=causes)
     axes.spines[:].set_visible(False)
     if len(names) <= ANNOTATED_NAMES:
         size = min(9.0, 0.36 * axes.bbox.width / len(names))  # four signs are 2.2 letters wide: a fifth stays free

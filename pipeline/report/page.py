@@ -1,4 +1,4 @@
-"""What all pages share: the template engine, style sheets and scripts, colours as CSS variables, width of a band.
+"""What all pages share: the template engine, style sheets and scripts, colours as CSS variables.
 
 Loads no drawing library: the index of ten thousand specimens is written by the process that hands out the work.
 """
@@ -9,13 +9,10 @@ import re
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
-
-from pipeline.settings.report import ReportSettings
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -69,8 +66,3 @@ def palette_css(colours: Mapping[str, tuple[str, str]] = PALETTE) -> Markup:
 def asset(name: str) -> Markup:
     """Style sheet or script of this project, put into the page as it is."""
     return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
-
-
-def band_width(settings: ReportSettings) -> float:
-    """Half width of a band in standard deviations."""
-    return NormalDist().inv_cdf(0.5 + settings.band_coverage / 2.0)

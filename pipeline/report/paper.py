@@ -202,26 +202,17 @@ def draw(paper: Paper, words: Words) -> list[tuple[str, Drawing]]:
         titles[f"fig7{letter}"] = words("paper_fig7", cause=_named(cause).said(words.language))
     # two halves stand one above the other, and a cable is longer than it is high
     heights = {"fig3": 150.0, "fig4": 560.0, "fig5": 560.0, "fig6": 560.0}
-    return [
-        (
-            title,
-            drawing(
-                name,
-                fills[name],
-                size=(400.0, heights.get(name, 300.0)),
-                title=title,
-                description=words("paper_numbers", title=title),
-            ),
-        )
-        for name, title in titles.items()
-    ]
+
+    def drawn(name: str, title: str) -> Drawing:
+        told = {"title": title, "description": words("paper_numbers", title=title)}
+        return drawing(name, fills[name], size=(400.0, heights.get(name, 300.0)), **told)
+
+    return [(title, drawn(name, title)) for name, title in titles.items()]
 
 
 def standalone(figure: Drawing) -> str:
     """The figure as a file of its own: the colours that a page would set are set in it."""
     head, rest = figure.svg.split(">", 1)
-    if "xmlns" not in head:
-        head += ' xmlns="http://www.w3.org/2000/svg"'
     return f"{head}><style>{palette_css(page_colours())}</style>{rest}\n"
 
 

@@ -30,7 +30,7 @@ def draw_shapes(experiment: TableOne, words: Words, figure: Area) -> Axes:
             1e3 * step.x, 1e3 * step.y, color=colour, label=f"{words('step')} {number}: {words.fixed(step.force, 4)} N"
         )
     axes.set_aspect("equal", adjustable="datalim")
-    return finish(axes, x="x [mm]", y="y [mm]", decimal=words.decimal, legend=2)
+    return finish(axes, words, x="x [mm]", y="y [mm]", legend=2)
 
 
 def draw_evolution(fit: PaperFit, words: Words, figure: Area) -> Axes:
@@ -43,13 +43,13 @@ def draw_evolution(fit: PaperFit, words: Words, figure: Area) -> Axes:
     names = [*(f"f_EI({knot:g} 1/m)" for knot in TABLE_1_KNOTS), "K0"]
     for column, (name, colour, mark) in enumerate(zip(names, step_colours(4), "osD^", strict=True)):
         axes.plot(count, values[:, column] / truth[column], color=colour, marker=mark, ms=4, label=name)
-    finish(axes, x=Ruling(words("paper_count"), whole=True), y=words("paper_relative"), decimal=words.decimal, legend=2)
+    finish(axes, words, x=Ruling(words("paper_count"), whole=True), y=words("paper_relative"), legend=2)
     laws = plot_area(below, top=ONE_ROW)
     for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
         law = Characteristic.from_ordinates(TABLE_1_KNOTS, state.ordinates)
         laws.plot(KAPPA, 1e3 * law.f(KAPPA), color=colour, lw=1.4, label=_named(fit, number, words))
     _truth(laws, words)
-    return finish(laws, x=words("axis_kappa"), y=STIFFNESS, decimal=words.decimal, legend=3)
+    return finish(laws, words, x=words("axis_kappa"), y=STIFFNESS, legend=3)
 
 
 def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
@@ -63,9 +63,9 @@ def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
     axes.hlines(forces[-1], 0, count[-1], color=LIGHT["measured"], lw=1.2, ls=":", label=words("paper_table"))
     finish(
         axes,
+        words,
         x=Ruling(words("paper_count"), whole=True),
         y=words("axis_force", unit="N"),
-        decimal=words.decimal,
         legend=4,
     )
     bends = plot_area(below, top=ONE_ROW)
@@ -73,7 +73,7 @@ def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
     for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
         bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=_named(fit, number, words))
     bends.plot(s, fit.steps[-1].kappa, color=LIGHT["measured"], ls=":", label=words("paper_table"))
-    return finish(bends, x=words("axis_s"), y=words("paper_bend"), decimal=words.decimal, legend=3)
+    return finish(bends, words, x=words("axis_s"), y=words("paper_bend"), legend=3)
 
 
 def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, words: Words, figure: Area) -> Axes:
@@ -86,7 +86,7 @@ def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, words: 
         axes.plot(KAPPA, 1e3 * forced.characteristic.f(KAPPA), color=LIGHT["alarm"], label=name)
         axes.plot(KAPPA, 1e3 * free.characteristic.f(KAPPA), color=LIGHT["inverse"], ls="--", label=words("paper_free"))
         _truth(axes, words)
-        finish(axes, x=words("axis_kappa"), y=STIFFNESS, decimal=words.decimal, legend=2)
+        finish(axes, words, x=words("axis_kappa"), y=STIFFNESS, legend=2)
     return axes
 
 
@@ -100,7 +100,7 @@ def draw_difference(cause: Difference, words: Words, figure: Area) -> Axes:
     label = words("paper_median", rms=f"{100 * cause.rms:.0f}")
     axes.plot(cause.kappa, 1e3 * cause.balance, color=LIGHT["balance"], ls="--", marker="o", ms=4, label=label)
     axes.set_ylim(0.0, 2e3 * float(max(cause.inverse.max(), cause.balance.max())))
-    return finish(axes, x=words("axis_kappa"), y=STIFFNESS, decimal=words.decimal, legend=3)
+    return finish(axes, words, x=words("axis_kappa"), y=STIFFNESS, legend=3)
 
 
 def _named(fit: PaperFit, iteration: int, words: Words) -> str | None:

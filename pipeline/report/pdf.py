@@ -94,14 +94,14 @@ def _lines(text: str, size: float, bold: bool = False) -> list[str]:
 def pdf_bytes(result: Result, settings: ReportSettings | None = None) -> bytes:
     """Content of ``report.pdf``."""
     settings = settings or ReportSettings()
-    words = Words(settings.language)
+    words = Words.of(settings)
     with style(SMALL):
         sheets = [answer_sheet(result, words, settings)]
         if result.steps or curves(result):
-            sheets.append(_mechanics_sheet(result, words, settings))
-        view = diagnosis_view(result, words, settings, figures=False)
+            sheets.append(_mechanics_sheet(result, words))
+        view = diagnosis_view(result, words, figures=False)
         if view is not None and view.examined and result.diagnosis is not None:
-            sheets.append(_diagnosis_sheet(result, result.diagnosis, view, words, settings))
+            sheets.append(_diagnosis_sheet(result, result.diagnosis, view, words))
         sheets.append(_photo_sheet(result, words, settings))
         file = io.BytesIO()
         metadata = {
@@ -124,11 +124,11 @@ def _head(result: Result) -> str:
 
 def answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
     """Answer, main figure, adequacy, agreement, K0 three ways, what to do next, warnings."""
-    sheet, said = Sheet(_head(result)), first_screen(result, words, settings)
+    sheet, said = Sheet(_head(result)), first_screen(result, words)
     sheet.text(said.sentence, size=14.0, bold=True)
     if curves(result):
-        figures.draw_characteristic(sheet.part(240.0, left=0.04, right=0.96), result, words, settings)
-        sheet.text(words("convention", coverage=words.number(100.0 * settings.band_coverage)), color=LIGHT["muted"])
+        figures.draw_characteristic(sheet.part(240.0, left=0.04, right=0.96), result, words)
+        sheet.text(words("convention", coverage=words.number(100.0 * words.coverage)), color=LIGHT["muted"])
         if said.doubt:
             sheet.text(said.doubt, bold=True)
     parts = [("what_next", said.advice)]
@@ -172,14 +172,14 @@ def list_troubles(sheet: Sheet, findings: list[FindingPart], words: Words) -> No
         sheet.text(told, size=size)
 
 
-def _mechanics_sheet(result: Result, words: Words, settings: ReportSettings) -> Sheet:
+def _mechanics_sheet(result: Result, words: Words) -> Sheet:
     """Forces with their table, moment curve, curvatures, residual map."""
     sheet = Sheet(_head(result))
     sheet.text(words("nav_mechanics"), size=13.0, bold=True)
     if result.steps:
-        figures.draw_forces(sheet.part(270.0, right=0.52, advance=False), result, words, settings)
+        figures.draw_forces(sheet.part(270.0, right=0.52, advance=False), result, words)
     if curves(result):
-        figures.draw_moment(sheet.part(270.0, left=0.52, advance=False), result, words, settings)
+        figures.draw_moment(sheet.part(270.0, left=0.52, advance=False), result, words)
     sheet.y += 278.0
     curved, residuals = any(photo.kappa_per_m for photo in result.photos), maps.answer_map(result)
     if curved:
@@ -245,9 +245,7 @@ def _height(photo: PhotoPart) -> float:
     return 0.0 if preview is None else min(width * preview.height / preview.width, 0.2 * PAGE[1])
 
 
-def _diagnosis_sheet(
-    result: Result, part: DiagnosisPart, view: DiagnosisView, words: Words, settings: ReportSettings
-) -> Sheet:
+def _diagnosis_sheet(result: Result, part: DiagnosisPart, view: DiagnosisView, words: Words) -> Sheet:
     """Headline, causes, ranking, maps before and after, gain, blind spots, next experiment."""
     sheet = Sheet(_head(result))
     sheet.text(words("nav_diagnosis"), size=13.0, bold=True)

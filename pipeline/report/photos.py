@@ -15,18 +15,12 @@ from matplotlib.axes import Axes
 from matplotlib.image import imread
 
 from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, plot_area
-from pipeline.report.page import band_width
 from pipeline.report.ruling import Ruling, printable
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart
-from pipeline.settings import ReportSettings
-from pipeline.units import suited
 
 PICTURE_HEAD = 18.0
 """Room above a photo for its name, px."""
-
-# A centerline of 200 points over a preview of 1000 px: more points than this cannot be told apart.
-LARGEST_PATH = 400
 
 
 def overlay_paths(photo: PhotoPart) -> tuple[str, str]:
@@ -39,22 +33,16 @@ def overlay_paths(photo: PhotoPart) -> tuple[str, str]:
     """
     if photo.preview is None or not photo.u_px:
         return "", ""
-    every = max(1, len(photo.u_px) // LARGEST_PATH)
     u = (np.asarray(photo.u_px) + 0.5) / photo.preview.reduction
     v = (np.asarray(photo.v_px) + 0.5) / photo.preview.reduction
     seen = np.asarray(photo.seen, dtype=bool)
-    return _path(u, v, seen, every), _path(u, v, ~seen, every)
+    return _path(u, v, seen), _path(u, v, ~seen)
 
 
-def _path(u: np.ndarray, v: np.ndarray, chosen: np.ndarray, every: int) -> str:
+def _path(u: np.ndarray, v: np.ndarray, chosen: np.ndarray) -> str:
     """Runs of chosen points as sub-paths; a run reaches to the neighbour on its right so that runs touch."""
-    parts = []
-    for first, last in _runs(chosen):
-        stop = min(last + 1, u.size)
-        index = sorted({*range(first, stop, every), stop - 1})
-        if len(index) > 1:
-            parts.append("M" + "L".join(f"{u[i]:.1f} {v[i]:.1f}" for i in index))
-    return "".join(parts)
+    runs = [range(first, min(last + 1, u.size)) for first, last in _runs(chosen)]
+    return "".join("M" + "L".join(f"{u[i]:.1f} {v[i]:.1f}" for i in run) for run in runs if len(run) > 1)
 
 
 def _runs(chosen: np.ndarray) -> list[tuple[int, int]]:
@@ -90,12 +78,12 @@ def draw_photo(area: Area, photo: PhotoPart, words: Words) -> Axes:
     return axes
 
 
-def draw_photo_curvature(figure: Area, photo: PhotoPart, words: Words, settings: ReportSettings) -> Axes:
+def draw_photo_curvature(figure: Area, photo: PhotoPart, words: Words) -> Axes:
     """Draw kappa(s) of one photo with its band and the fit; below, the position left over along the normal."""
     height, s = figure.bbox.height, 1e3 * np.asarray(photo.s_m)
     residual = bool(photo.shape_residual_m)
     axes = plot_area(figure, top=ONE_ROW, bottom=0.42 * height if residual else 42.0)
-    kappa, half = np.asarray(photo.kappa_per_m), band_width(settings) * np.asarray(photo.kappa_std_per_m)
+    kappa, half = np.asarray(photo.kappa_per_m), words.half_band * np.asarray(photo.kappa_std_per_m)
     axes.fill_between(s, kappa - half, kappa + half, color=LIGHT["measured"], alpha=0.18, lw=0.0)
     axes.plot(s, kappa, color=LIGHT["measured"], lw=1.6, label=words("measured"))
     if photo.kappa_fit_per_m:
@@ -107,23 +95,23 @@ def draw_photo_curvature(figure: Area, photo: PhotoPart, words: Words, settings:
         axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
     _along_the_cable(axes, s, seen)
     if residual:
-        _residual(figure, photo, s, words, settings)
+        _residual(figure, photo, s, words)
     under = Ruling(labelled=False) if residual else Ruling(words("axis_s"))
-    return finish(axes, x=under, y=words("axis_kappa"), decimal=words.decimal, legend=3)
+    return finish(axes, words, x=under, y=words("axis_kappa"), legend=3)
 
 
-def _residual(figure: Area, photo: PhotoPart, s: np.ndarray, words: Words, settings: ReportSettings) -> None:
+def _residual(figure: Area, photo: PhotoPart, s: np.ndarray, words: Words) -> None:
     """Measured minus simulated position along the normal, with the noise of the photo as a band around zero."""
     axes = plot_area(figure, top=0.66 * figure.bbox.height)
-    unit = suited([*photo.shape_residual_m, *photo.shape_residual_std_m], "m", decimal=words.decimal)
+    unit = words.unit("m", *photo.shape_residual_m, *photo.shape_residual_std_m)
     if photo.shape_residual_std_m:
-        half = unit.factor * band_width(settings) * np.asarray(photo.shape_residual_std_m)
+        half = unit.factor * words.half_band * np.asarray(photo.shape_residual_std_m)
         axes.fill_between(s, -half, half, color=LIGHT["unvisited"], alpha=0.2, lw=0.0)
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     axes.plot(s, unit.factor * np.asarray(photo.shape_residual_m), color=LIGHT["measured"], lw=1.2)
     _along_the_cable(axes, s, np.asarray(photo.seen, dtype=bool))
     left_over = Ruling(words("axis_residual", unit=unit.symbol), most=4)
-    finish(axes, x=words("axis_s"), y=left_over, decimal=words.decimal)
+    finish(axes, words, x=words("axis_s"), y=left_over)
 
 
 def _along_the_cable(axes: Axes, s: np.ndarray, seen: np.ndarray) -> None:

@@ -32,23 +32,22 @@ def plot_characteristic(result: Result, *, settings: ReportSettings | None = Non
     settings : ReportSettings, optional
         Language and width of the bands.
     """
-    lacking = None if curves(result) else Message("misuse.no-curve", name=result.specimen.id)
-    size = (420.0, 310.0)
-    return _figure(lambda area, *how: figures.draw_characteristic(area, result, *how), size, settings, lacking)
+    words = _words(settings, None if curves(result) else Message("misuse.no-curve", name=result.specimen.id))
+    return _figure(lambda area: figures.draw_characteristic(area, result, words), (420.0, 310.0))
 
 
 def plot_forces(result: Result, *, settings: ReportSettings | None = None) -> Figure:
     """Draw measured and simulated forces over the displacement; parameters as `plot_characteristic`."""
-    lacking = None if result.steps else Message("misuse.no-forces", name=result.specimen.id)
-    return _figure(lambda area, *how: figures.draw_forces(area, result, *how), (400.0, 350.0), settings, lacking)
+    words = _words(settings, None if result.steps else Message("misuse.no-forces", name=result.specimen.id))
+    return _figure(lambda area: figures.draw_forces(area, result, words), (400.0, 350.0))
 
 
 def plot_residuals(result: Result, *, settings: ReportSettings | None = None) -> Figure:
     """Draw what the model of the answer leaves of the shapes, in standard deviations, over arc length and step."""
     left = maps.answer_map(result)
-    if left is None:
-        raise _refused(settings, Message("misuse.no-residuals", name=result.specimen.id))
-    return _figure(lambda area, words, _: maps.draw_map(area, left, words), (400.0, maps.map_height(left)), settings)
+    words = _words(settings, None if left else Message("misuse.no-residuals", name=result.specimen.id))
+    assert left is not None
+    return _figure(lambda area: maps.draw_map(area, left, words), (400.0, maps.map_height(left)))
 
 
 def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = None) -> Figure:
@@ -57,32 +56,27 @@ def plot_photo(result: Result, step: int, *, settings: ReportSettings | None = N
     Raises `ValueError` where the result holds no picture of that step.
     """
     pictures = {one.step: (one, one.preview) for one in result.photos if one.preview is not None}
-    if step not in pictures:
-        pictured = ", ".join(map(str, pictures)) or "-"
-        raise _refused(settings, Message("misuse.no-picture", name=result.specimen.id, step=step, pictured=pictured))
+    pictured = ", ".join(map(str, pictures)) or "-"
+    lacking = Message("misuse.no-picture", name=result.specimen.id, step=step, pictured=pictured)
+    words = _words(settings, None if step in pictures else lacking)
     photo, preview = pictures[step]
     size = (500.0, photos.PICTURE_HEAD + 500.0 * preview.height / preview.width)
-    return _figure(lambda area, words, _: photos.draw_photo(area, photo, words), size, settings)
+    return _figure(lambda area: photos.draw_photo(area, photo, words), size)
 
 
-def _refused(settings: ReportSettings | None, said: Message) -> ValueError:
-    """The error in the language of the figure."""
-    return ValueError(said.said((settings or ReportSettings()).language))
-
-
-def _figure(
-    draw: Callable[[Area, Words, ReportSettings], Axes],
-    size: tuple[float, float],
-    settings: ReportSettings | None,
-    lacking: Message | None = None,
-) -> Figure:
-    """A figure of so many px at 72 dots per inch that shows itself in a notebook; what it lacks is an error."""
-    settings = settings or ReportSettings()
+def _words(settings: ReportSettings | None, lacking: Message | None) -> Words:
+    """Words of a figure; what the result lacks for it is an error in their language."""
+    words = Words.of(settings or ReportSettings())
     if lacking is not None:
-        raise _refused(settings, lacking)
+        raise ValueError(lacking.said(words.language))
+    return words
+
+
+def _figure(draw: Callable[[Area], Axes], size: tuple[float, float]) -> Figure:
+    """A figure of so many px at 72 dots per inch that shows itself in a notebook."""
     with style():
         figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72, facecolor="white")
-        draw(figure, Words(settings.language), settings)
+        draw(figure)
     figure.set_dpi(DOTS_PER_INCH)
     figure._repr_png_ = lambda: _png(figure)  # type: ignore[attr-defined]  # what notebooks ask an object for
     return figure

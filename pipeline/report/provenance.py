@@ -8,7 +8,6 @@ from typing import Any
 from pipeline.report.figures import force_unit
 from pipeline.report.words import Words
 from pipeline.result import Result
-from pipeline.units import suited
 
 # Shown in their own places, not in the list of plain facts.
 APART = ("clock", "command", "inputs_sha256", "settings")
@@ -70,7 +69,7 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
     rows = [(words("fit_outcome"), (words.said(part.said).sentence if part.advice else part.outcome) + without)]
     if part.misfit is not None:
         misfit, force = part.misfit, force_unit(result, words)
-        length = suited([misfit.shape_rmse_m], "m", decimal=words.decimal)
+        length = words.unit("m", misfit.shape_rmse_m)
         dof = misfit.degrees_of_freedom
         rows += [
             (

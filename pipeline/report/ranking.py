@@ -59,7 +59,7 @@ def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words) -> Axes:
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.axvline(0.0, color=LIGHT["muted"], lw=0.8)
     causes = Ruling(at=tuple(places), labels=tuple(labels), grid=False, mark=0.0)
-    finish(pull, x=Ruling(words("axis_pull"), most=4), y=causes, decimal=words.decimal)
+    finish(pull, words, x=Ruling(words("axis_pull"), most=4), y=causes)
     unnamed = Ruling(at=tuple(places), grid=False, labelled=False)
-    finish(impact, x=Ruling(words("axis_impact"), most=4), y=unnamed, decimal=words.decimal)
+    finish(impact, words, x=Ruling(words("axis_impact"), most=4), y=unnamed)
     return pull

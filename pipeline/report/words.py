@@ -11,6 +11,7 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from pipeline.messages import DECIMAL, PER, Message, catalogue, entry, sentence, word
@@ -19,6 +20,7 @@ from pipeline.units import Unit, amount_unit
 
 if TYPE_CHECKING:
     from pipeline.result import BlindSpot
+    from pipeline.settings.report import ReportSettings
 
 TABLE = Path(__file__).parent / "templates" / "words.toml"
 CODES = TABLE.with_name("codes.toml")
@@ -54,12 +56,14 @@ class Said:
 
 @dataclass(frozen=True)
 class Words:
-    """Words and numbers of one language.
+    """How a report tells things: words and numbers of one language, bands of one width.
 
     Parameters
     ----------
     language : str
         ``en`` or ``de``.
+    coverage : float
+        Share of normal errors inside a band.
 
     Raises
     ------
@@ -68,6 +72,12 @@ class Words:
     """
 
     language: str = "en"
+    coverage: float = 0.95
+
+    @classmethod
+    def of(cls, settings: ReportSettings) -> Words:
+        """The words that settings ask for."""
+        return cls(settings.language, settings.band_coverage)
 
     def __post_init__(self) -> None:
         if self.language not in DECIMAL:
@@ -77,6 +87,11 @@ class Words:
     def decimal(self) -> str:
         """Decimal sign."""
         return DECIMAL[self.language]
+
+    @property
+    def half_band(self) -> float:
+        """Half width of a band in standard deviations."""
+        return NormalDist().inv_cdf(0.5 + self.coverage / 2.0)
 
     @property
     def _place(self) -> int:

@@ -16,7 +16,6 @@ from pipeline.report.words import Words
 from pipeline.result import FindingPart, leading
 from pipeline.result.headline import headline
 from pipeline.run import measure
-from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_result import measured_result
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,7 +53,7 @@ def test_faults_of_the_data_come_before_the_numbers(measured, code, level, leads
     fault = FindingPart(code=code, level=level, message="the log is wrong")
     assert (leading([fault]) is not None) == leads
     words = Words("en")
-    told = first_screen(measured.model_copy(update={"findings": [fault]}), words, ReportSettings())
+    told = first_screen(measured.model_copy(update={"findings": [fault]}), words)
     before_numbers = told.sentence.casefold().partition("the bending")[0]
     assert ("the log is wrong." in before_numbers) == leads and (told.tone == "bad") == leads
     remedy = words.code(code)

@@ -13,7 +13,6 @@ from pipeline.report.answer import first_screen
 from pipeline.report.frames import characteristic_frame
 from pipeline.report.words import Words
 from pipeline.result import FindingPart, ForceCorrectionPart, Result, SpecimenPart, from_json, to_json
-from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
 
@@ -92,8 +91,8 @@ def test_what_is_stored_counts(measured):
 def test_the_first_sentence_of_the_report_says_so(measured, language, said):
     wrong = found(measured, "size/force", "error")
     words = Words(language)
-    assert said in first_screen(wrong, words, ReportSettings()).sentence.split(". ")[0]
-    assert said not in first_screen(measured, words, ReportSettings()).sentence
+    assert said in first_screen(wrong, words).sentence.split(". ")[0]
+    assert said not in first_screen(measured, words).sentence
 
 
 def test_no_comparison_holds_it(measured):

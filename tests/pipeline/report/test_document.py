@@ -265,7 +265,7 @@ def test_ways_whose_bands_say_nothing_are_not_said_to_agree(full_result, size, s
     inverse = full_result.inverse.model_copy(update={"curve": curve.model_copy(update={"tangent_std_Nm2": std})})
     wide = full_result.model_copy(update={"inverse": inverse, "diagnosis": None})
     assert wide.agreement.compatible
-    told = [first_screen(one, Words(), ReportSettings()).agreement for one in (wide, full_result)]
+    told = [first_screen(one, Words()).agreement for one in (wide, full_result)]
     assert told[0].startswith("Whether the two ways agree cannot be told: ") and said in told[0]
     assert "The two ways agree: " in told[1] and "p = " not in told[1]
 

@@ -7,7 +7,6 @@ from pipeline.report.canvas import style
 from pipeline.report.evidence import mechanics_figures
 from pipeline.report.figures import draw_moment, draw_pointwise, stiffness_unit
 from pipeline.report.words import Words
-from pipeline.settings import ReportSettings
 
 
 def test_a_stiffness_below_zero_stays_in_the_picture(full_result):
@@ -19,7 +18,7 @@ def test_a_stiffness_below_zero_stays_in_the_picture(full_result):
         update={"balance": full_result.balance.model_copy(update={"curve": wild}), "photos": []}
     )
     with style():
-        axes = draw_pointwise(Figure(figsize=(6, 4), dpi=72), result, Words(), ReportSettings())
+        axes = draw_pointwise(Figure(figsize=(6, 4), dpi=72), result, Words())
     assert axes.get_ylim()[0] == pytest.approx(stiffness_unit(result, Words()).factor * lowest)
 
 
@@ -29,7 +28,7 @@ def test_a_stray_point_of_a_photo_does_not_shrink_the_moment_curve(full_result):
     stray |= {"points_moment_Nm": [*balance.points_moment_Nm, 0.0]}
     result = full_result.model_copy(update={"balance": balance.model_copy(update=stray)})
     with style():
-        axes = draw_moment(Figure(figsize=(6, 4), dpi=72), result, Words(), ReportSettings())
+        axes = draw_moment(Figure(figsize=(6, 4), dpi=72), result, Words())
     assert axes.get_xlim()[1] < 1.2 * full_result.inverse.curve.kappa_per_m[-1]
 
 
@@ -40,7 +39,7 @@ def test_branches_are_compared_where_both_bent_the_cable(full_result, unvisited)
     branches = {name: none if name in unvisited else curve for name in ("loading", "unloading")}
     inverse = full_result.inverse.model_copy(update={"branches": branches})
     result = full_result.model_copy(update={"inverse": inverse, "photos": []})
-    assert "branches" not in mechanics_figures(result, Words(), ReportSettings())
+    assert "branches" not in mechanics_figures(result, Words())
 
 
 def test_the_unit_is_that_of_the_answer(diagnosed):

@@ -10,14 +10,13 @@ from pipeline.report.evidence import main_figure, pointer_data
 from pipeline.report.figures import steps_of_answer
 from pipeline.report.frames import beam_frame, simulation_frame
 from pipeline.report.maps import photos_of_answer
-from pipeline.report.page import band_width
 from pipeline.report.words import Words
 from pipeline.result import BlindSpot, FindingPart, TwinPart, set_aside
 from pipeline.settings import ReportSettings
 from tests.pipeline.report.virtual_diagnosis import diagnosis_of
 from tests.pipeline.report.virtual_result import measured_result
 
-SETTINGS, WORDS = ReportSettings(), Words("en")
+WORDS = Words("en")
 
 
 def with_spots(result, *spots):
@@ -30,11 +29,10 @@ def with_spots(result, *spots):
 def test_what_could_hide_is_told_where_it_would_leave_the_band(diagnosed):
     result = diagnosed("adequate")
     curve = result.answer.curve
-    band = band_width(SETTINGS) * float((curve.tangent_std / curve.tangent).mean())
+    band = WORDS.half_band * float((curve.tangent_std / curve.tangent).mean())
     told = first_screen(
         with_spots(result, ("force_gain", 0.5 * band), ("plastic_set", 2.0 * band), ("hysteresis", -0.27)),
         WORDS,
-        SETTINGS,
     ).hidden
     assert [line.split(",")[0] for line in told] == ["hysteresis", "plastic set"]
     assert told[0] == "hysteresis, by up to 27 % of f_EI: unloading in the same steps would show it."
@@ -50,7 +48,7 @@ def test_what_is_quoted_lies_where_the_data_determine_it(diagnosed):
     result = result.model_copy(update={"inverse": result.inverse.model_copy(update={"curve": spiked})})
     (kappa, _, band) = result.answer.curve.ends()[1]
     assert kappa == curve.kappa_per_m[-4] and band == std[-4]
-    assert f"κ\xa0=\xa0{kappa:.3g}\xa01/m" in first_screen(result, WORDS, SETTINGS).sentence
+    assert f"κ\xa0=\xa0{kappa:.3g}\xa01/m" in first_screen(result, WORDS).sentence
 
 
 def test_what_lacks_the_cause_that_was_found_shows_no_pre_curvature(diagnosed):
@@ -63,7 +61,7 @@ def test_ways_that_disagree_do_so_by_the_probability_of_their_difference(diagnos
     """By bands that hold errors of both, 2.9 % were expected of two ways that contradict each other at 1 %."""
     result = diagnosed("unexplained")
     apart = result.agreement.model_copy(update={"compatible": False, "p_value": 1e-3})
-    told = first_screen(result.model_copy(update={"agreement": apart}), WORDS, SETTINGS).agreement
+    told = first_screen(result.model_copy(update={"agreement": apart}), WORDS).agreement
     assert "(p = 0.001)" in told and "expected" not in told
 
 
@@ -75,7 +73,7 @@ def test_a_sign_that_a_cause_cannot_have_is_named_and_no_probability_is_certain(
     ]
     sure = [cause.model_copy(update={"probability": 0.9982}) for cause in result.diagnosis.causes]
     part = result.diagnosis.model_copy(update={"table": rows, "causes": sure})
-    shown = diagnosis_view(result.model_copy(update={"diagnosis": part}), WORDS, SETTINGS)
+    shown = diagnosis_view(result.model_copy(update={"diagnosis": part}), WORDS)
     assert shown.rows[-1][0] == "bearing friction" and "wrong sign" in shown.rows[-1]
     assert "(probability > 99 %)" in shown.named[0].line
 
@@ -114,9 +112,9 @@ def test_nothing_is_concluded_from_numbers_that_are_not_usable(diagnosed):
 
 def test_what_was_found_hides_no_more(diagnosed):
     spots = ("hysteresis", 0.3), ("bearing_friction", 0.25), ("plastic_set", 0.2)
-    told = first_screen(with_spots(diagnosed("class"), *spots), WORDS, SETTINGS).hidden
+    told = first_screen(with_spots(diagnosed("class"), *spots), WORDS).hidden
     assert [line.split(",")[0] for line in told] == ["plastic set"]
-    told = first_screen(with_spots(diagnosed("unexplained"), *spots), WORDS, SETTINGS).hidden
+    told = first_screen(with_spots(diagnosed("unexplained"), *spots), WORDS).hidden
     assert len(told) == 3
 
 
@@ -126,7 +124,7 @@ def test_other_names_of_a_cause_are_told_once_the_likeliest_first(diagnosed):
     twins = [TwinPart(name=name, probability=0.1**place, settled_by="") for place, name in enumerate(others, 1)]
     cause = result.diagnosis.causes[0].model_copy(update={"twins": twins})
     result = result.model_copy(update={"diagnosis": result.diagnosis.model_copy(update={"causes": [cause]})})
-    (named,) = diagnosis_view(result, WORDS, SETTINGS, figures=False).named
+    (named,) = diagnosis_view(result, WORDS, figures=False).named
     friction = "bearing friction (10 %; settled by unloading in the same steps)"
     assert f"cannot be told apart here from {friction}; these leave no more than noise either: " in named.line
     assert [named.line.count(WORDS.cause(name)) for name in others] == [1, 1, 1, 1, 0]
@@ -134,7 +132,8 @@ def test_other_names_of_a_cause_are_told_once_the_likeliest_first(diagnosed):
 
 @pytest.mark.parametrize("language", ["en", "de"])
 def test_bands_say_what_they_do_not_contain(diagnosed, language):
-    settings, words = ReportSettings(language=language), Words(language)
+    settings = ReportSettings(language=language)
+    words = Words.of(settings)
     assert words("band_unexplained") in report_html(diagnosed("unexplained"), settings)
     assert words("band_unexplained") not in report_html(diagnosed("named"), settings)
 
@@ -149,7 +148,7 @@ def test_curves_without_the_cause_are_set_aside(diagnosed, full_result):
 
 def test_the_pointer_knows_which_curves_are_set_aside(diagnosed):
     result = diagnosed("named")
-    ways = pointer_data(result, main_figure(result, WORDS, SETTINGS), WORDS, SETTINGS)["ways"]
+    ways = pointer_data(result, main_figure(result, WORDS), WORDS)["ways"]
     assert {way["method"]: way["aside"] for way in ways} == {"inverse": True, "balance": True, "extended": False}
 
 
