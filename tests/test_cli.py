@@ -38,6 +38,8 @@ HEAVY = {
 }
 IN_PROCESS = ("--set", "batch.in_process=true")
 
+PIPELINE = "pipeline.batch.batch.PIPELINE"
+
 
 def call(*arguments, **options):
     return CliRunner().invoke(main, [str(argument) for argument in arguments], **options)
@@ -46,7 +48,7 @@ def call(*arguments, **options):
 @pytest.fixture
 def cheap(monkeypatch, tmp_path):
     """Specimens a, b and c, and a measurement that costs nothing."""
-    monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: cheap_stages()))
+    monkeypatch.setattr(PIPELINE, cheap_stages())
     monkeypatch.chdir(tmp_path)
     write_specimens(tmp_path / "batch", ["a", "b", "c"])
     return tmp_path
@@ -179,14 +181,13 @@ def test_interrupt_keeps_what_is_done(cheap, monkeypatch):
             raise KeyboardInterrupt
         return stages.measure(folder, settings, command=command)
 
-    interrupted = Stages(measure, stages.write, stages.write_index)
-    monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: interrupted))
+    monkeypatch.setattr(PIPELINE, Stages(measure, stages.write, stages.write_index))
     done = call("run", "batch", "-o", "out", *IN_PROCESS)
     assert done.exit_code == 130
     assert "the same command resumes" in done.stderr
     assert (cheap / "out/a/result.json").exists()
     assert (cheap / "out/index.txt").exists()
-    monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: stages))
+    monkeypatch.setattr(PIPELINE, stages)
     assert "(1 kept from an earlier run)" in call("run", "batch", "-o", "out", *IN_PROCESS).stdout
 
 
@@ -201,8 +202,7 @@ def test_report_draws_again_without_measuring(cheap, monkeypatch):
         drawn.append((result.specimen.id, settings.report.language))
         stages.write(result, folder, settings)
 
-    redrawing = Stages(None, write, stages.write_index)
-    monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: redrawing))
+    monkeypatch.setattr(PIPELINE, Stages(None, write, stages.write_index))
     done = call("report", "out", "--language", "de")
     assert done.exit_code == 0
     assert drawn == [("a", "de"), ("c", "de")]
@@ -220,8 +220,7 @@ def test_reports_can_wait_until_they_are_asked_for(cheap, monkeypatch):
         if settings.batch.reports:
             drawn.append(result.specimen.id)
 
-    drawing = Stages(stages.measure, write, stages.write_index)
-    monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: drawing))
+    monkeypatch.setattr(PIPELINE, Stages(stages.measure, write, stages.write_index))
     assert call("run", "batch", "-o", "out", "--no-reports", *IN_PROCESS).exit_code == 0
     assert drawn == []
     (cheap / "out/b/result.json").write_text("{")
@@ -336,8 +335,7 @@ def test_language_reaches_the_reports_and_no_result(cheap, monkeypatch):
         written.append(settings.report.language)
         stages.write(result, folder, settings)
 
-    speaking = Stages(stages.measure, write, stages.write_index)
-    monkeypatch.setattr(Stages, "of_pipeline", classmethod(lambda cls: speaking))
+    monkeypatch.setattr(PIPELINE, Stages(stages.measure, write, stages.write_index))
     results = []
     for language, kept in (("de", ""), ("en", "(1 kept"), ("en", "(1 kept")):  # drawn again, and measured once
         done = call("run", "batch/a", "-o", "out", "--language", language, *IN_PROCESS)

@@ -22,6 +22,7 @@ from pipeline.settings import Settings
 from pipeline.settings.batch import BatchSettings
 
 LOG_NAME = "cablebend.log"
+PIPELINE = Stages()
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def run_batch(
     InputError
         ``out/busy``, ``out/unwritable``, ``batch/no-scheduler``.
     """
-    store, stages = Store(out.absolute()), stages or Stages.of_pipeline()
+    store, stages = Store(out.absolute()), stages or PIPELINE
     with store.locked(), _log(store) as log:
         orders = make_orders(folders, out, settings, options=options)
         tally = Tally(len(orders), tuple(order.name for order in orders))
@@ -131,7 +132,7 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, Message | None]
     InputError
         ``out/busy``, ``out/unwritable``.
     """
-    store, stages = Store(out.absolute()), Stages.of_pipeline()
+    store = Store(out.absolute())
     with store.locked():
         for name in store.names():
             try:
@@ -141,18 +142,18 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, Message | None]
                 yield name, Message("cli.unreadable", why=error.said)
                 continue
             try:
-                draw_again(store, name, result, stages, settings)
+                draw_again(store, name, result, PIPELINE, settings)
             except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # values that no measurement gives
                 yield name, Message("cli.undrawable", error=type(error).__name__, why=str(error))
                 continue
             yield name, None
-        stages.write_index(store.out, settings)
+        PIPELINE.write_index(store.out, settings)
 
 
 def _indexed(store: Store, tally: Tally, settings: Settings, stages: Stages) -> Tally:
     """Write the index over everything stored; a folder that takes no more files is told."""
     try:
-        told: tuple[Message | str, ...] = tuple(stages.write_index(store.out, settings) or ())
+        told: tuple[Message | str, ...] = tuple(stages.write_index(store.out, settings))
     except OSError as error:
         told = (store.unwritable(error).placed,)
     return replace(tally, trouble=(*tally.trouble, *told))

@@ -27,29 +27,13 @@ from pipeline.result.row import as_entry, index_row
 from pipeline.settings import Settings
 from pipeline.threads import keep_memory, one_thread
 
-Measure = Callable[..., Result]
-Write = Callable[..., None]
 Doing = Callable[[str], None]
-WriteIndex = Callable[
-    [Path, Settings], Iterable[Message] | None
-]  # what is said on specimens that contradict each other
 ATTEMPTS = 2
 """Times that a specimen may lose its worker; once may be bad luck with memory, not twice."""
 ENTRY_SCHEMA = "cablebend/entry/1"
 
 
-@dataclass(frozen=True)
-class Stages:
-    """What is done with a specimen; the pipeline itself unless a test or a notebook says otherwise."""
-
-    measure: Measure
-    write: Write
-    write_index: WriteIndex
-
-    @classmethod
-    def of_pipeline(cls) -> Stages:
-        """The pipeline, imported where it is needed: in the worker, when the first specimen is measured."""
-        return cls(_pipeline_measure, _pipeline_write, _pipeline_write_index)
+# The pipeline is imported where it is needed: in the worker, when the first specimen is measured.
 
 
 def _pipeline_measure(folder: Path, settings: Settings, *, command: str, on_stage: Doing) -> Result:
@@ -72,6 +56,18 @@ def _pipeline_write_index(out: Path, settings: Settings) -> Iterable[Message]:
     write_rows(rows, out, settings.report)
     write_atomic(out / "result.schema.json", json.dumps(schema(), indent=1) + "\n")
     return [Message("cli.outlying", name=row.id, said=row.fault) for row in rows if row.outlying]
+
+
+@dataclass(frozen=True)
+class Stages:
+    """What is done with a specimen; the pipeline itself unless a test or a notebook says otherwise.
+
+    ``write_index`` gives what is to be said on specimens that contradict each other.
+    """
+
+    measure: Callable[..., Result] = _pipeline_measure
+    write: Callable[..., None] = _pipeline_write
+    write_index: Callable[[Path, Settings], Iterable[Message]] = _pipeline_write_index
 
 
 @dataclass(frozen=True)
@@ -109,23 +105,20 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True, doing: 
     doing : callable
         Told the name of each stage that begins.
     """
-    started = time.monotonic()
-    store = Store(order.out)
+    started, store, timeout_s = time.monotonic(), Store(order.out), order.settings.batch.timeout_s
     try:
-        if guarded:
-            timeout_s = order.settings.batch.timeout_s
-            refused = _earlier_attempts(store, order, timeout_s)
-            if refused is not None:
-                return store_failure(order, [refused], started)
-            with deadline(timeout_s, store.overdue(order.name).touch):
-                outcome = _measured(store, order, stages, started, doing)
-            store.end(order.name)
-            return outcome
-        return _measured(store, order, stages, started, doing)
-    except InputError as error:
-        return store_failure(order, refusals(error), started)
+        if not guarded:
+            return _measured(store, order, stages, started, doing)
+        refused = _earlier_attempts(store, order, timeout_s)
+        if refused is not None:
+            return store_failure(order, [refused], started)
+        with deadline(timeout_s, store.overdue(order.name).touch):
+            outcome = _measured(store, order, stages, started, doing)
+        store.end(order.name)
+        return outcome
     except Exception as error:  # the one place: whatever breaks on a specimen is its finding and never costs the batch
-        return store_failure(order, refusals(error), started, trace=traceback.format_exc())
+        trace = None if isinstance(error, InputError) else traceback.format_exc()
+        return store_failure(order, refusals(error), started, trace=trace)
 
 
 def refusals(error: Exception) -> list[FindingPart]:

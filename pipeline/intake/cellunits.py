@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.intake.columns import Columns, factor_of
+from pipeline.intake.columns import Columns, unit_of
 from pipeline.intake.dialect import is_missing
 from pipeline.intake.specimenfile import MEASURED
 from pipeline.messages import Message
@@ -27,29 +27,24 @@ def without_units(
     Raises `InputError` ``log/unit`` where the unit is not known, or the header says another.
     """
     for role in MEASURED:
-        found = _split(table.get(role, ()))
+        found = _split(table[role]) if role in table else None
         if found is None:
             continue
-        cells, unit = found
+        cells, given = found
         try:
-            factor = factor_of(role, unit, path, line)
+            unit, header = unit_of(role, given, path, line), columns.units[role]
         except InputError:
             if role == "time":  # ``8:00 AM``: such times are left out, the test is not
                 continue
             raise
-        if role not in columns.assumed and factor != columns.factor[role]:
-            raise InputError(Message("log/unit.cells", header=columns.units[role], cells=unit), path=path, line=line)
+        if not header.assumed and unit.factor != header.factor:
+            raise InputError(Message("log/unit.cells", header=header.name, cells=given), path=path, line=line)
         table = {**table, role: cells}
-        columns = replace(
-            columns,
-            factor={**columns.factor, role: factor},
-            units={**columns.units, role: unit},
-            assumed=tuple(other for other in columns.assumed if other != role),
-        )
+        columns = replace(columns, units={**columns.units, role: unit})
     return table, columns
 
 
-def _split(cells: list[str] | tuple[()]) -> tuple[list[str], str] | None:
+def _split(cells: list[str]) -> tuple[list[str], str] | None:
     """Numbers of a column and the unit that stands in every cell that holds one; None if it does not."""
     bare, units = [], set()
     for cell in cells:

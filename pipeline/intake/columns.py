@@ -8,8 +8,9 @@ newton, metre and second.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from pipeline.errors import InputError
 from pipeline.intake.dialect import SEPARATORS, Rows, column_names, head_rows, looks_like_number
@@ -61,23 +62,29 @@ HEAD = 300
 """Lines among which the header is looked for; the metadata blocks of testing machines have up to about 100."""
 
 
+class LogUnit(NamedTuple):
+    """Unit of a column: its name, SI units in it, and whether it was not given but is the usual one."""
+
+    name: str
+    factor: float
+    assumed: bool
+
+
 @dataclass(frozen=True)
 class Columns:
     """Where the roles stand and how to convert them.
 
-    ``index``: role -> column from 0. ``factor``: role -> SI unit per unit of the log. ``assumed``: roles whose unit was
-    not given. ``header_line``, ``first_row``: line of the header, and index of the first row of data.
+    ``index``: role -> column from 0. ``units``: role -> unit. ``header_line``, ``first_row``: line of the header, and
+    index of the first row of data. ``width``: cells of the header.
     """
 
     index: dict[str, int]
-    factor: dict[str, float]
+    units: dict[str, LogUnit]
     separator: str
     header_line: int
     first_row: int
-    assumed: tuple[str, ...] = ()
-    skipped_lines: int = 0
-    width: int = 0
-    units: dict[str, str] = field(default_factory=dict)
+    skipped_lines: int
+    width: int
 
 
 def find_columns(text: str, spec: LogSpec, *, path: Path) -> tuple[Columns, Rows]:
@@ -183,40 +190,32 @@ def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:
     headless = isinstance(spec.columns.get("force"), int)
     below = rows[row + 1][1] if len(rows) > row + 1 else []
     unit_row = not headless and _is_unit_row(below, index)
-    units: dict[str, str] = {}
-    for role in MEASURED:
-        if role not in index:
-            continue
+    units: dict[str, LogUnit] = {}
+    for role in (role for role in MEASURED if role in index):
         in_name = "" if headless else _split_unit(header[index[role]])[1]
-        in_row = _bare(below[index[role]]) if unit_row and index[role] < len(below) else ""
-        units[role] = spec.units.get(role) or in_name or in_row
+        in_row = _bare(below[index[role]]) if unit_row else ""
+        units[role] = unit_of(role, spec.units.get(role) or in_name or in_row, path, line)
     return Columns(
         index=index,
-        factor={role: factor_of(role, unit, path, line) for role, unit in units.items()},
+        units=units,
         separator=rows.separator,
         header_line=line,
         first_row=row + (0 if headless else 2 if unit_row else 1),
-        assumed=tuple(role for role, unit in units.items() if not unit),
         skipped_lines=row,
         width=len(header),
-        units={role: unit or ASSUMED[role] for role, unit in units.items()},
     )
 
 
-def factor_of(role: str, unit: str, path: Path, line: int | None) -> float:
-    """SI units per unit; capitals matter (mN, MN) unless only one reading exists (KN, MM, SEC).
+def unit_of(role: str, given: str, path: Path, line: int | None) -> LogUnit:
+    """The unit of a column as given; capitals matter (mN, MN) unless only one reading exists (KN, MM, SEC).
 
     Raises `InputError` ``log/unit``.
     """
-    unit = SPELLED.get(unit.casefold(), unit or ASSUMED[role]).replace(
-        "μ", "µ"
-    )  # Greek mu and the micro sign look the same
-    known = UNITS[role]
-    if unit in known:
-        return known[unit]
-    alike = {factor for name, factor in known.items() if name.casefold() == unit.casefold()}
+    name, known = given or ASSUMED[role], UNITS[role]
+    unit = SPELLED.get(name.casefold(), name).replace("μ", "µ")  # Greek mu and the micro sign look the same
+    alike = {known[unit]} if unit in known else {known[one] for one in known if one.casefold() == unit.casefold()}
     if len(alike) == 1:
-        return alike.pop()
+        return LogUnit(name, alike.pop(), not given)
     told = Message("log/unit", unit=repr(unit), role=role, usual=ASSUMED[role], known=known)
     raise InputError(told, path=path, line=line)
 

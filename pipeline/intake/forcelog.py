@@ -70,7 +70,8 @@ def _reading(columns: Columns, encoding: str, path: Path) -> list[Finding]:
         findings.append(inferred("log/encoding-inferred", file=path.name))
     if columns.skipped_lines:
         findings.append(inferred("log/metadata", file=path.name, line=columns.header_line))
-    if columns.assumed:
-        taken = [Message("log/unit-assumed.role", role=role, unit=columns.units[role]) for role in columns.assumed]
+    assumed = {role: unit.name for role, unit in columns.units.items() if unit.assumed}
+    if assumed:
+        taken = [Message("log/unit-assumed.role", role=role, unit=name) for role, name in assumed.items()]
         findings.append(inferred("log/unit-assumed", file=path.name, taken=taken))
     return findings

@@ -67,9 +67,9 @@ def no_photos(folder: Path, settings: IntakeSettings, *, why: Message | None = N
     """The error for a folder without a photo, or of none that can be used; pictures of other kinds are named."""
     other = [PurePosixPath(name).name for name in _of_other_kinds(folder, None, settings)]
     below = [f"{place}/{entry}" for place in _named(folder, settings) for entry in _entries(folder / place)]
-    aside = [entry for entry in _entries(folder) if entry.casefold() not in FOLDERS]
-    aside = [entry for entry in (*aside, *below) if any(map(_is_photo, _entries(folder / entry)))]
-    told = Message("folder/no-photos.none") if why is None else why
+    beside = [entry for entry in _entries(folder) if entry.casefold() not in FOLDERS]
+    aside = [entry for entry in (*beside, *below) if _holds_photos(folder / entry)]
+    told = why or Message("folder/no-photos.none")
     if other:
         told = Message("folder/no-photos.other-kinds", told=told, names=_some(other))
     remedy = "aside" if aside else "convert" if other else "put" if why is None else "as-named"
@@ -95,16 +95,13 @@ def _places(folder: Path, settings: IntakeSettings, without: Path | None) -> lis
 
     places = [""]
     for place in _named(folder, settings):
-        within = [f"{place}/{entry}" for entry in _entries(folder / place) if not NO_PHOTO.search(entry)]
         within = [
             deeper
-            for deeper in within
-            if any(map(_is_photo, _entries(folder / deeper)))
-            and inside(folder, deeper, allow_outside=settings.allow_outside) is not None
-            and not calibrates(deeper)
+            for entry in _entries(folder / place)
+            if not NO_PHOTO.search(entry) and _holds_photos(folder / (deeper := f"{place}/{entry}"))
+            if inside(folder, deeper, allow_outside=settings.allow_outside) and not calibrates(deeper)
         ]
-        alone = len(within) == 1 and not any(map(_is_photo, _entries(folder / place)))
-        places.append(within[0] if alone else place)
+        places.append(within[0] if len(within) == 1 and not _holds_photos(folder / place) else place)
     return [place for place in places if not calibrates(place)]
 
 
@@ -133,6 +130,10 @@ def _is_photo(name: str) -> bool:
     return PurePosixPath(name).suffix.casefold() in SUFFIXES and not NO_PHOTO.search(name)
 
 
+def _holds_photos(directory: Path) -> bool:
+    return any(map(_is_photo, _entries(directory)))
+
+
 def match_photos(
     folder: Path, steps: Sequence[LoadStep], *, calibration: Path | None, log_name: str, settings: IntakeSettings
 ) -> FoundPhotos:
@@ -151,20 +152,19 @@ def match_photos(
     used: dict[str, int] = {}
     matched = []
     for step in steps:
-        if step.image is None:
+        name, noted = _present_name(folder, step, present, log_name, settings) if step.image else (None, [])
+        findings += noted
+        if name is None:
             matched.append(step)
             continue
-        name, noted = _present_name(folder, step, present, log_name, settings)
-        findings += noted
-        if name is not None and name in used:
+        if name in used:
             findings.append(doubtful("photo/doubled", step=used[name], other=step.step, image=repr(name)))
-        if name is not None:
-            used[name] = step.step
-            path, digest, trouble = checked_photo(folder, name, settings)
-            findings += trouble
-            if path is not None:
-                paths[name], hashes[name] = path, digest
-        matched.append(step if name is None else replace(step, image=name))
+        used[name] = step.step
+        path, digest, trouble = checked_photo(folder, name, settings)
+        findings += trouble
+        if path is not None:
+            paths[name], hashes[name] = path, digest
+        matched.append(replace(step, image=name))
     if not paths:
         key = "folder/no-photos.unusable" if findings else "folder/no-photos.unusable-all"
         raise no_photos(folder, settings, why=Message(key, last=findings[-1].said if findings else ""))
@@ -227,24 +227,18 @@ def _present_name(
     path = inside(folder, name, allow_outside=settings.allow_outside)
     if path is None:
         return None, [doubtful("photo/outside.named", **place)]
+    exists = os.path.isfile(path)  # noqa: PTH113  # pathlib raises for a name of more than 255 bytes
     beside = [other for other in present if PurePosixPath(other).name == name]
-    if not _exists(path) and len(beside) == 1:
+    if not exists and len(beside) == 1:
         return beside[0], []  # the name alone, as people write it: there is nothing else that it could mean
     alike = [other for other in present if _loose(other) == _loose(name)]
     alike = alike or [other for other in present if _loose(other, whole=False) == _loose(name, whole=False)]
     converted = len(alike) == 1 and PurePosixPath(name).suffix.casefold() in OTHER_SUFFIXES
-    if not converted and (_exists(path) or name in present):  # no ordinary file is refused with its reason later
+    if not converted and (exists or name in present):  # no ordinary file is refused with its reason later
         return name, []
     if len(alike) == 1:
         return alike[0], [inferred("photo/name", taken=alike[0], **place)]
     return None, [doubtful("photo/missing", step=step.step, **place)]
-
-
-def _exists(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:
-        return False
 
 
 def _loose(name: str, *, whole: bool = True) -> str:

@@ -118,7 +118,7 @@ def read_samples(
         decimal=spec.decimal,
         others=lambda: read.others(_told(columns)),
         travels=displacement,
-        farthest=length / columns.factor["displacement"],
+        farthest=length / columns.units["displacement"].factor,
     )
     numbers = _Numbers(decimal, columns, path, lines)
     steps = _carry_down(table["step"])[0] if "step" in table else []
@@ -135,7 +135,7 @@ def read_samples(
         steps=tuple(steps[row] for row in kept) if any(steps) else None,
         branches=None if branches is None else tuple(branches[row] for row in kept),
         images=tuple(images[row] for row in kept),
-        resolution=columns.factor["force"] * 10.0 ** -min(max(places, -300), 300),
+        resolution=columns.units["force"].factor * 10.0 ** -min(max(places, -300), 300),
         findings=(*_losses(path.name, lines, force, carried, read.summary), *noted),
     )
     return samples, columns
@@ -182,7 +182,7 @@ class _Numbers:
         return number
 
     def column(self, role: str, cells: Sequence[str], kept: Sequence[int]) -> Array:
-        factor = self.columns.factor[role]
+        factor = self.columns.units[role].factor
         return np.fromiter((self.value(role, cells[row], row) * factor for row in kept), float, len(kept))
 
 

@@ -10,13 +10,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from pipeline.result import PhotoPart, Result, Visited
     from pipeline.result.row import RowCurve
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

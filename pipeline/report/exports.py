@@ -15,14 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from pipeline.messages import Message
+from pipeline.records import Array
 from pipeline.report.curves import Equivalent, equivalent
 from pipeline.result import Result, Visited
 from pipeline.rounding import plain, rounded
-
-Array = NDArray[np.float64]
 
 DENSITY = 1000.0
 """Of water, kg/m^3: a number of the right size in a place that must not be empty."""

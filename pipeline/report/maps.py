@@ -12,14 +12,13 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from pipeline.report.canvas import LIGHT, NOISE, ONE_ROW, Area, finish, label_width, plot_area
 from pipeline.report.ruling import Ruling, rule
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart, ResidualMap, Result
 
-Array = NDArray[np.float64]
 # More names than this on an axis cannot be annotated at 440 px.
 ANNOTATED_NAMES = 9
 SHADES = 64  # of a scale of colours; no eye tells more of them apart

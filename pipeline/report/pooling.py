@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from pipeline.records import Array
 from pipeline.report.curves import Equivalent, equivalent
 from pipeline.result.row import RowCurve
 
-Array = NDArray[np.float64]
 POINTS = 41
 
 

@@ -23,11 +23,10 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import TICKDOWN, TICKLEFT, TICKRIGHT
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from pipeline.rounding import fixed, plain
 
-Array = NDArray[np.float64]
 Side = Literal["bottom", "left", "right"]
 
 # Comes with matplotlib, so that a report is the same on every machine; a page shows the font of its reader.

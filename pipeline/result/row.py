@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, PlainValidator, StrictBool, StrictInt, TypeAdapter
 
 from pipeline.messages import UNREADABLE, Message
+from pipeline.records import Array
 from pipeline.rounding import digits
 
 if TYPE_CHECKING:
     from pipeline.result import Result, Visited
 
-Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 End = tuple[Finite, Finite, Finite]
 Text = Annotated[str, AfterValidator(lambda text: text.encode("utf-8", "replace").decode("utf-8"))]

@@ -10,12 +10,10 @@ from dataclasses import dataclass, field
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from pipeline.result.parts import Curve, Method
 from pipeline.rounding import plain, rounded
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,17 +17,16 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import CATALOGUE
 from pipeline.intake.tomltable import nearest
 from pipeline.messages import Message
+from pipeline.records import Array
 from pipeline.vision.render import Camera
 from rod.bending_test import BendingTest
 from rod.characteristic import Characteristic
 from rod.section import InternalFriction
 
-Array = NDArray[np.float64]
 Values = tuple[float, ...]
 
 SPAN_PER_M = 10.0  # ordinates of nonlinear_stiffness lie evenly over K - K0 = 0 .. 10 1/m, as in the paper's Table 1

@@ -11,17 +11,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipeline.messages import Message, ended
-from pipeline.records import Branch
+from pipeline.records import Array, Branch
 from pipeline.simulate.effects import Readings, Setup, Values, check_geometry, hide
 from pipeline.vision.render import Camera
 from rod.bending_test import BendingTest, simulate
 from rod.laws import StickSlip
 
-Array = NDArray[np.float64]
 ProtocolName = Literal["three", "loading", "unloading"]
 
 ELEMENTS = 400  # of the rod: 16 times closer to the continuum than the fit's 100, far below the noise of any photo

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from pipeline.messages import Message
@@ -23,8 +22,6 @@ from pipeline.simulate.experiment import Experiment, State, bend, protocol
 from pipeline.simulate.photography import Photography
 from pipeline.vision.render import Camera, Picture, render, render_board
 from pipeline.vision.render.sensor import write_picture
-
-Array = NDArray[np.float64]
 
 TRUTH_POINTS = 101
 

@@ -139,6 +139,7 @@ def cheap_stages() -> Stages:
         store = Store(out)
         rows = [json.dumps(store.entry(name), sort_keys=True) for name in store.names()]
         (out / "index.txt").write_text("\n".join(rows) + "\n")
+        return []
 
     return Stages(measure, write, write_index)
 

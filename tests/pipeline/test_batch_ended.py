@@ -11,12 +11,12 @@ import pytest
 from tests.pipeline.cheap_batch import PATIENCE_S, ROOT, wait_for, write_specimens
 
 PROGRAM = """
-from pipeline.batch.specimen import Stages
+from pipeline.batch import batch
 from pipeline.cli import main
 from tests.pipeline.cheap_batch import cheap_stages
 
 if __name__ == "__main__":
-    Stages.of_pipeline = classmethod(lambda cls: cheap_stages())
+    batch.PIPELINE = cheap_stages()
     main()
 """
 
