@@ -76,8 +76,9 @@ def conclusion_of(bench: Workbench, search: Search) -> Conclusion:
 def _classes(bench: Workbench, believed: Posterior, accepted: Explanation) -> tuple[tuple[int, ...], ...]:
     """Names that may stand for each cause of the accepted explanation, from the credible set.
 
-    In another pair each cause stands for the one it is closer to; a single cause stands for both of a pair, and both of
-    a pair for a single cause. A set that holds the accepted causes and another one says nothing against them.
+    In another pair each cause stands for the one it is closer to; a single cause stands for both of a pair, and the
+    closer one of a pair for a single cause. A set that holds the accepted causes and another one says nothing against
+    them.
     """
     suspicion = bench.suspicion
     close = between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))
@@ -87,8 +88,8 @@ def _classes(bench: Workbench, believed: Posterior, accepted: Explanation) -> tu
         if set(accepted.causes) < set(other.causes):
             continue
         if len(places) == 1 or len(other.causes) == 1:
-            for place in places:
-                place += other.causes
+            for place, own in zip(places, accepted.causes, strict=True):
+                place.append(max(other.causes, key=lambda cause: close[own, cause]))
             continue
         (a, b), (c, d) = accepted.causes, other.causes
         straight = close[a, c] + close[b, d] >= close[a, d] + close[b, c]
