@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
+from pipeline.cli.options import POSITIVE, chosen_settings, settings_options
 from pipeline.cli.run import found, nothing_found
 from pipeline.cli.speech import entry, say, told
 from pipeline.cli.spoken import Spoken
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
 @click.option("--timeout", type=POSITIVE, metavar="SECONDS")
 @click.option("--json", "as_json", is_flag=True)
-@language_option
 @settings_options
 @click.pass_context
 def check(ctx: click.Context, folders: tuple[Path, ...], timeout: float | None, as_json: bool) -> None:

@@ -36,22 +36,17 @@ def compare(ctx: click.Context, a: Path, b: Path, as_json: bool, out: Path | Non
 
         write_csv(comparison_frame(comparison), out)
     if as_json:
-        click.echo(json.dumps(as_document(comparison), indent=1))
+        click.echo(json.dumps(as_document(comparison), indent=1, default=lambda array: array.tolist()))
     else:
         echo_comparison(comparison)
     ctx.exit(MISSING if comparison.verdict == "not comparable" else 0)
 
 
 def as_document(comparison: Comparison) -> dict[str, object]:
-    """The comparison as plain values."""
+    """The comparison as plain values and arrays."""
     from dataclasses import asdict
 
-    arrays = ("kappa_per_m", "ratio", "ratio_std")
-    document: dict[str, object] = {
-        **asdict(comparison),
-        **{name: getattr(comparison, name).tolist() for name in arrays},
-    }
-    del document["said"]
+    document = {name: value for name, value in asdict(comparison).items() if name != "said"}
     findings = [finding.document for finding in comparison.findings]
     return document | {"statement": comparison.statement, "findings": findings}
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import chosen_options, chosen_settings, language_option, settings_options
+from pipeline.cli.options import chosen_options, chosen_settings, settings_options
 from pipeline.cli.speech import entry, language, table, told
 from pipeline.cli.spoken import Spoken
 from pipeline.messages import DECIMAL, Message
@@ -24,7 +24,6 @@ COMPARED = 5  # places along the visited range at which f_EI is laid beside the 
     "-o", "--out", default="cablebend-demo", type=click.Path(path_type=Path, file_okay=False), show_default=True
 )
 @click.option("--seed", default=0, show_default=True)
-@language_option
 @settings_options
 @click.pass_context
 def demo(ctx: click.Context, out: Path, seed: int) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, chosen_settings, language_option, settings_options
+from pipeline.cli.options import POSITIVE, chosen_settings, settings_options
 from pipeline.cli.speech import columns, complaint, entry, language, say, table, told
 from pipeline.cli.spoken import Spoken
 from pipeline.messages import Message
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 @click.option("--force-noise", default=0.003, show_default=True, type=POSITIVE)
 @click.option("--samples", default=8, show_default=True, type=click.IntRange(1))
 @click.option("--json", "as_json", is_flag=True)
-@language_option
 @settings_options
 def design(
     length_mm: float,

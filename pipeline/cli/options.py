@@ -21,10 +21,10 @@ SETTINGS_FILE, ASSIGNMENTS = "cablebend.settings_file", "cablebend.assignments"
 
 
 def settings_options(command: Command) -> Command:
-    """Add ``--settings FILE`` and ``--set section.key=value``, for `chosen_settings`."""
+    """Add ``--language``, ``--settings FILE`` and ``--set section.key=value``, for `chosen_settings`."""
     file = click.Path(path_type=Path, dir_okay=False, exists=True)
     command = _kept("--set", "assignments", multiple=True, metavar="SECTION.KEY=VALUE")(command)
-    return _kept("--settings", "settings_file", type=file, metavar="FILE")(command)
+    return language_option(_kept("--settings", "settings_file", type=file, metavar="FILE")(command))
 
 
 def language_option(command: Command) -> Command:

@@ -114,11 +114,8 @@ def echo_prediction(prediction: Prediction) -> None:
             values["rise_m"] = (step.y_m[top], step.y_std_m[top])
             values["bend_per_m"] = (step.kappa_max_per_m, max(step.kappa_std_per_m))
         shown = told(Message("prediction.step", **values)) if values else ""
-        why = (
-            told(Message("prediction.status", status=step.status.replace(" ", "-"), said=step.said))
-            if step.said
-            else ""
-        )
+        status = Message("prediction.status", status=step.status.replace(" ", "-"), said=step.said)
+        why = told(status) if step.said else ""
         at = told(Message("prediction.at", displacement_mm=1e3 * step.displacement_m))
         click.echo(entry(f"{at:>12}  ", "  ".join(filter(None, (shown, why)))))
     if prediction.reachable_m is not None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from pipeline.cli.options import chosen_settings, language_option, settings_options
+from pipeline.cli.options import chosen_settings, settings_options
 from pipeline.cli.speech import refuse, told
 from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
@@ -15,7 +15,6 @@ from pipeline.messages import Message
 
 @click.command(cls=Spoken)
 @click.argument("out", type=click.Path(path_type=Path, exists=True, file_okay=False))
-@language_option
 @settings_options
 @click.pass_context
 def report(ctx: click.Context, out: Path) -> None:

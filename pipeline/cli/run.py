@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pipeline.cli.options import POSITIVE, chosen_options, chosen_settings, language_option, settings_options
+from pipeline.cli.options import POSITIVE, chosen_options, chosen_settings, settings_options
 from pipeline.cli.speech import entry, note, refuse, say, told
 from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 @click.option("--timeout", type=POSITIVE, metavar="SECONDS")
 @click.option("--no-reports", is_flag=True)
 @click.option("--json", "as_json", is_flag=True)
-@language_option
 @settings_options
 @click.pass_context
 def run(

@@ -59,7 +59,8 @@ class LogSpec:
 
 
 # Outside, a size is surely in another unit: from a fine wire to a submarine cable, a phone at 10 m to a microscope.
-LENGTH, DIAMETER, SCALE = (5.0, 20_000.0, "(mm)"), (0.05, 500.0, "(mm)"), (0.05, 5_000.0, "(px/mm)")
+LENGTH = number_in(5.0, 20_000.0, "(mm)", 1e-3)
+DIAMETER = number_in(0.05, 500.0, "(mm)", 1e-3)
 
 
 def read_specimen_file(folder: Path, settings: IntakeSettings) -> Specimen:
@@ -93,8 +94,8 @@ def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> Speci
     return Specimen(
         id=cable.get("id", folder_name(folder)),
         folder=folder,
-        length_m=cable["length_mm"] * 1e-3,
-        diameter_m=cable["diameter_mm"] * 1e-3,
+        length_m=cable["length_mm"],
+        diameter_m=cable["diameter_mm"],
         camera=camera,
         rig=_rig(values["rig"]),
         steps=(),
@@ -135,20 +136,18 @@ def _camera(source: TomlFile, values: dict[str, Any], folder: Path, settings: In
             raise source.error(told, table="camera", key="calibration")
         if "board" not in values:
             raise source.error(Message("camera/no-board"), table="camera", key="calibration")
-    scale, distance = values.get("scale_px_per_mm"), values.get("distance_mm")
     return CameraSpec(
-        scale_px_per_m=None if scale is None else scale * 1e3,
+        scale_px_per_m=values.get("scale_px_per_mm"),
         calibration=calibration,
         board=values.get("board"),
-        distance_m=None if distance is None else distance * 1e-3,
+        distance_m=values.get("distance_mm"),
     )
 
 
 def _rig(values: dict[str, Any]) -> RigSpec:
-    marker = values.get("bearing_marker_mm")
     return RigSpec(
         moving_bearing=values.get("moving_bearing", "left"),
-        marker_diameter_m=None if marker is None else marker * 1e-3,
+        marker_diameter_m=values.get("bearing_marker_mm"),
         bearings_px=values.get("bearings_px"),
         force_sign=values.get("force_sign", "compression"),
     )
@@ -178,13 +177,13 @@ def _forbidden(char: str) -> bool:
 def _board(value: Any) -> Board:
     require(isinstance(value, dict) and {"columns", "rows", "square_mm"} <= value.keys(), "wanted.board")
     require(value.keys() <= {"columns", "rows", "square_mm", "charuco", "marker_mm"}, "wanted.board.keys")
-    side, count = number_in(0.1, 1000.0, "(mm)"), whole(2, 1000)
+    side, count = number_in(0.1, 1000.0, "(mm)", 1e-3), whole(2, 1000)
     return Board(
         columns=count(value["columns"]),
         rows=count(value["rows"]),
-        square_m=side(value["square_mm"]) * 1e-3,
+        square_m=side(value["square_mm"]),
         charuco=flag(value.get("charuco", False)),
-        marker_m=side(value["marker_mm"]) * 1e-3 if "marker_mm" in value else None,
+        marker_m=side(value["marker_mm"]) if "marker_mm" in value else None,
     )
 
 
@@ -204,22 +203,22 @@ def _units(value: Any) -> dict[str, str]:
 CHECKS: dict[str, dict[str, Check]] = {
     "specimen": {
         "id": _identifier,
-        "length_mm": number_in(*LENGTH),
-        "diameter_mm": number_in(*DIAMETER),
+        "length_mm": LENGTH,
+        "diameter_mm": DIAMETER,
         "type": free_text,
         "batch": free_text,
         "notes": free_text,
         "temperature_C": lambda value: f"{number(value):g}",
     },
     "camera": {
-        "scale_px_per_mm": number_in(*SCALE),
+        "scale_px_per_mm": number_in(0.05, 5_000.0, "(px/mm)", 1e3),
         "calibration": path_text,
         "board": _board,
-        "distance_mm": number_in(1.0, 1e6, "(mm)"),
+        "distance_mm": number_in(1.0, 1e6, "(mm)", 1e-3),
     },
     "rig": {
         "moving_bearing": one_of("left", "right"),
-        "bearing_marker_mm": number_in(*DIAMETER),
+        "bearing_marker_mm": DIAMETER,
         "bearings_px": points(2, "wanted.bearings", most=2),
         "force_sign": one_of("compression", "tension"),
     },
@@ -232,4 +231,4 @@ CHECKS: dict[str, dict[str, Check]] = {
         "encoding": one_of("utf-8", "cp1252", "utf-16"),
     },
 }
-"""Known tables, their keys and the values these may hold."""
+"""Known tables, their keys and the values these may hold; numbers with a unit leave in SI."""

@@ -154,13 +154,13 @@ def number(value: Any) -> float:
     return float(value)
 
 
-def number_in(low: float, high: float, unit: str) -> Check:
-    """A number within a range; outside, the unit is wrong."""
+def number_in(low: float, high: float, unit: str, si: float) -> Check:
+    """A number within a range, times ``si`` as it leaves; outside, the unit is wrong."""
 
     def check(value: Any) -> float:
         given = number(value)
         require(low <= given <= high, "wanted.range", low=low, high=high, unit=unit)
-        return given
+        return given * si
 
     return check
 

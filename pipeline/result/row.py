@@ -28,7 +28,7 @@ Text = Annotated[str, AfterValidator(lambda text: text.encode("utf-8", "replace"
 Told = Annotated[Message | None, PlainValidator(lambda said: said if said is None else Message.read(said))]
 STATUSES = ("measured", "partial", "failed")
 
-ROW = 5
+ROW = 6
 """Version of what stands in an entry; another one is made anew from the result."""
 
 SHAPES, SHAPE_POINTS = 5, 11
@@ -45,7 +45,7 @@ class RowCurve:
     kappa : (n,) 1/m
     tangent, tangent_std : (n,) N m^2
     factor : (n, r) N m^2
-        F with F F^T the covariance of the tangent: a lower triangle, r = n; r = 0 where it is not known.
+        F with F F^T the covariance of the tangent; r = 0 where it is not known.
     """
 
     kappa: Array
@@ -157,7 +157,7 @@ def thinned(curve: Visited, points: int) -> RowCurve:
     """The curve interpolated to so many points."""
     grid = np.linspace(curve.kappa[0], curve.kappa[-1], points)
     columns = [np.interp(grid, curve.kappa, column) for column in curve.factor.T]
-    # F F^T is all that is asked for: a triangle tells it by half the numbers, and most curves have more columns
+    # F F^T is all that is asked for: a square tells it, and most curves have more columns
     square = np.vstack([np.zeros((points, points)), *columns])
     return RowCurve(
         kappa=grid,
@@ -196,7 +196,7 @@ def as_entry(row: IndexRow) -> dict[str, Any]:
         "range": digits([curve.kappa[0], curve.kappa[-1]], 9),
         "tangent": digits(curve.tangent, 9),
         "tangent_std": digits(curve.tangent_std, 9),
-        "factor": b64encode(curve.factor[_below(*curve.factor.shape)].astype("<f4").tobytes()).decode(),
+        "factor": b64encode(curve.factor.astype("<f4").tobytes()).decode(),
     }  # fmt: skip
     return {"version": ROW, **plain}
 
@@ -216,42 +216,14 @@ def _adapter() -> TypeAdapter[IndexRow]:
     return TypeAdapter(IndexRow)
 
 
-def _table(values: Any, *shape: int) -> Array:
-    """Finite numbers, so many of them; -1 for any number."""
-    table = np.array(values, dtype=float)
-    fits = table.ndim == len(shape) and all(asked in (-1, n) for asked, n in zip(shape, table.shape, strict=True))
-    if (table.size and not fits) or not np.isfinite(table).all():
-        raise ValueError("numbers that are not finite, or too few or many")
-    return table if fits else table.reshape(shape)  # a view of each would be kept ten thousand times
-
-
 def _curve(data: Any) -> RowCurve | None:
     if data is None:
         return None
-    tangent = _table(data["tangent"], -1)
-    (low, high), count = _table(data["range"], 2), tangent.size
-    if count < 2 or not low < high:
-        raise ValueError("a curve of nothing")
-    return RowCurve(
-        kappa=np.linspace(low, high, count),
-        tangent=tangent,
-        tangent_std=_table(data["tangent_std"], count),
-        factor=_triangle(data["factor"], count),
-    )
-
-
-def _triangle(text: str, count: int) -> NDArray[np.float32]:
-    """A lower triangle from its numbers, row by row; no columns without any."""
-    numbers = np.frombuffer(b64decode(text, validate=True), "<f4")
-    below = _below(count, count if numbers.size else 0)
-    if numbers.size != np.count_nonzero(below) or not np.isfinite(numbers).all():
-        raise ValueError("numbers that are not finite, or too few or many")
-    triangle = np.zeros(below.shape, np.float32)
-    triangle[below] = numbers
-    return triangle
-
-
-@cache
-def _below(rows: int, columns: int) -> NDArray[np.bool_]:
-    """Where the numbers of a lower triangle stand."""
-    return np.tri(rows, columns, dtype=bool)
+    low, high = data["range"]
+    tangent, tangent_std = np.array([data["tangent"], data["tangent_std"]], dtype=float)
+    factor = np.frombuffer(b64decode(data["factor"], validate=True), "<f4").reshape(tangent.size, -1)
+    if tangent.size < 2 or not low < high or factor.shape[1] not in (0, tangent.size):
+        raise ValueError("a curve of nothing, or numbers that are too few or many")
+    if not all(np.isfinite(numbers).all() for numbers in (low, high, tangent, tangent_std, factor)):
+        raise ValueError("numbers that are not finite")
+    return RowCurve(np.linspace(low, high, tangent.size), tangent, tangent_std, factor)
