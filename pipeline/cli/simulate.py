@@ -45,18 +45,7 @@ def effect(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...
 @click.option("--seed", default=0, show_default=True)
 @language_option
 def simulate(
-    folder: Path,
-    effects: dict[str, Any],
-    length_mm: float,
-    diameter_mm: float,
-    plan: Any,
-    steps: int,
-    step_mm: float,
-    seed: int,
-    EI0: float,
-    EI1: float,
-    kc: float,
-    K0: float,
+    folder: Path, length_mm: float, diameter_mm: float, plan: Any, steps: int, step_mm: float, **cable: Any
 ) -> None:
     """Bend a virtual cable, photograph it, and write a specimen FOLDER; the truth goes beside it, not into it."""
     from pipeline.simulate import Experiment, protocol, simulate_specimen
@@ -67,12 +56,7 @@ def simulate(
             length_m=length_mm * 1e-3,
             diameter_m=diameter_mm * 1e-3,
             displacements_m=protocol(plan, steps, step_mm * 1e-3),
-            effects=effects,
-            seed=seed,
-            EI0=EI0,
-            EI1=EI1,
-            kc=kc,
-            K0=K0,
+            **cable,
         )
         written = simulate_specimen(folder, experiment)
     except ValueError as error:

@@ -17,7 +17,7 @@ from pipeline.report import figures, maps, photos
 from pipeline.report.canvas import Area, Drawing, drawing
 from pipeline.report.curves import seen_range
 from pipeline.report.words import Said, Words
-from pipeline.result import PhotoPart, PreviewPart, ResidualMap, Result, curves, set_aside, trusted
+from pipeline.result import PhotoPart, ResidualMap, Result, curves, set_aside, trusted
 from pipeline.rounding import digits
 from pipeline.units import Unit
 
@@ -29,14 +29,10 @@ SENT = 5  # digits of numbers for the pointer: more than any band here supports,
 
 @dataclass(frozen=True)
 class PhotoView:
-    """One photo on the page: its picture with the paths over it, and its curvature figure."""
+    """One photo on the page, what lies over its picture, and its curvature figure."""
 
-    index: int
-    step: int
-    image: str
-    status: str
+    photo: PhotoPart
     reason: str
-    preview: PreviewPart | None
     seen_path: str
     hidden_path: str
     bearings: list[tuple[float, float]]
@@ -171,7 +167,7 @@ def _photo_view(index: int, photo: PhotoPart, words: Words) -> PhotoView:
         ends = {"low": words.curvature(low), "high": words.curvature(high)}
         kappa = titled(f"kappa-{index}", draw, words, key="kappa", size=TALL, **ends)
     told, marks = words.after_colon(photo.said) if photo.reason else "", photos.bearing_marks(photo)
-    return PhotoView(index, photo.step, photo.image, photo.status, told, photo.preview, seen, hidden, marks, kappa)
+    return PhotoView(photo, told, seen, hidden, marks, kappa)
 
 
 def force_rows(result: Result, words: Words) -> list[list[str]]:

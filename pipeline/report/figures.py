@@ -60,8 +60,7 @@ def draw_characteristic(figure: Area, result: Result, words: Words) -> Axes:
     axes.axvspan(high, high + margin, **shade)
     for method, curve in parts.items():
         if method in aside:
-            name, look = words(f"way_{method}"), {"color": LIGHT[method], "ls": DASHES[method], "gid": SET_ASIDE}
-            axes.plot(curve.kappa, unit.factor * curve.tangent, lw=1.2, alpha=0.45, label=name, **look)
+            _faint(axes, curve.kappa, unit.factor * curve.tangent, method, words, gid=SET_ASIDE)
         else:
             _banded(axes, curve, unit, words, front=1.0 if method == answering else 0.0)
     if result.inverse and "inverse" in parts and "inverse" not in aside:
@@ -127,8 +126,14 @@ def _banded(
     axes.plot(curve.kappa, unit.factor * value, label=label or words(f"way_{role}"), **look)
 
 
+def _faint(axes: Axes, kappa: np.ndarray, values: np.ndarray, method: str, words: Words, **mark: str) -> None:
+    """A curve that is set aside: thin, pale and without a band."""
+    look: dict[str, Any] = {"color": LIGHT[method], "ls": DASHES[method], "lw": 1.2, "alpha": 0.45, **mark}
+    axes.plot(kappa, values, label=words(f"way_{method}"), **look)
+
+
 def draw_moment(figure: Area, result: Result, words: Words) -> Axes:
-    """Draw m(kappa) by every way, with the points m = P y of the balance equations."""
+    """Draw m(kappa) by every way, with the points m = P y of the balance equations; what is set aside faint."""
     axes, parts = plot_area(figure), trusted(result)
     unit = words.unit("N m", *(v for curve in _drawn(result) for v in curve.moment))
     if result.balance and result.balance.points_kappa_per_m:
@@ -144,8 +149,11 @@ def draw_moment(figure: Area, result: Result, words: Words) -> Axes:
             alpha=0.7,
             label=words("points_balance"),
         )
-    for curve in parts.values():
-        _banded(axes, curve, unit, words, quantity="moment")
+    for method, curve in parts.items():
+        if method in set_aside(result):
+            _faint(axes, curve.kappa, unit.factor * curve.moment, method, words)
+        else:
+            _banded(axes, curve, unit, words, quantity="moment")
     ends = [end for curve in parts.values() for end in (curve.kappa[0], curve.kappa[-1])]
     if ends:  # single points of a photo may lie anywhere
         margin = 0.08 * (max(ends) - min(ends))
