@@ -40,7 +40,7 @@ class Tally:
     reused: int = 0
     interrupted: bool = False
     unstored: dict[str, dict[str, Any]] = field(default_factory=dict)
-    trouble: tuple[Message | str, ...] = ()
+    trouble: tuple[Message, ...] = ()
 
     @property
     def done(self) -> int:
@@ -114,7 +114,11 @@ def run_batch(
             tally = replace(tally, interrupted=True)
         finally:
             outcomes.close()
-        tally = _indexed(store, tally, settings, stages)
+        try:
+            trouble: tuple[Message, ...] = tuple(stages.write_index(store.out, settings))
+        except OSError as error:  # a folder that takes no more files
+            trouble = (store.unwritable(error).placed,)
+        tally = replace(tally, trouble=trouble)
         log.info("end: %d measured, %d failed, %d of them kept", tally.measured, tally.failed, tally.reused)
     return tally
 
@@ -148,15 +152,6 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, Message | None]
                 continue
             yield name, None
         PIPELINE.write_index(store.out, settings)
-
-
-def _indexed(store: Store, tally: Tally, settings: Settings, stages: Stages) -> Tally:
-    """Write the index over everything stored; a folder that takes no more files is told."""
-    try:
-        told: tuple[Message | str, ...] = tuple(stages.write_index(store.out, settings))
-    except OSError as error:
-        told = (store.unwritable(error).placed,)
-    return replace(tally, trouble=(*tally.trouble, *told))
 
 
 class _LogFile(logging.FileHandler):

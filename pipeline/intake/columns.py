@@ -146,7 +146,8 @@ def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
                 there = wanted <= len(header) and (role not in MEASURED or looks_like_number(header[wanted - 1]))
                 places = [wanted - 1] if there else []
             else:
-                places = [place for place, cell in enumerate(header) if _same(cell, wanted)]
+                plain = wanted.casefold().split()
+                places = [place for place, cell in enumerate(header) if cell.casefold().split() == plain]
         else:
             places = [place for place, base in enumerate(bases) if base == role]
         if places:
@@ -248,7 +249,3 @@ def _bare(cell: str) -> str:
 def _plain(cell: str) -> str:
     """A name as it is compared: small letters, no punctuation, single blanks."""
     return " ".join(re.sub(r"[_.\-:#]+", " ", cell.casefold()).split())
-
-
-def _same(cell: str, wanted: str) -> bool:
-    return " ".join(cell.casefold().split()) == " ".join(wanted.casefold().split())

@@ -111,12 +111,14 @@ def read_samples(
     kept = array("q", (row for row, cell in enumerate(force) if not is_missing(cell) and displacement[row]))
     if not kept:
         raise InputError(Message("log/empty.no-row"), path=path)
+    # columns that do not decide on the decimal sign: forces and displacements have, and step 1.2 is no number
+    told = {columns.index[role] for role in ("force", "displacement", "step", "image") if role in columns.index}
     decimal = decimal_sign(
         chain(force, displacement),
         path=path,
         separator=columns.separator,
         decimal=spec.decimal,
-        others=lambda: read.others(_told(columns)),
+        others=lambda: read.others(told),
         travels=displacement,
         farthest=length / columns.units["displacement"].factor,
     )
@@ -155,11 +157,6 @@ def _losses(
     if carried:
         findings.append(inferred("log/carried-down", file=name, count=carried))
     return findings
-
-
-def _told(columns: Columns) -> set[int]:
-    """Columns of forces, displacements and labels, which do not decide on the decimal sign: step 1.2 is no number."""
-    return {place for role, place in columns.index.items() if role in ("force", "displacement", "step", "image")}
 
 
 @dataclass(frozen=True)

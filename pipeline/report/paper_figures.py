@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from pipeline.records import Array
 from pipeline.report.canvas import LIGHT, ONE_ROW, TWO_ROWS, Area, finish, plot_area, step_colours
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
@@ -45,9 +46,8 @@ def draw_evolution(fit: PaperFit, words: Words, figure: Area) -> Axes:
         axes.plot(count, values[:, column] / truth[column], color=colour, marker=mark, ms=4, label=name)
     finish(axes, words, x=Ruling(words("paper_count"), whole=True), y=words("paper_relative"), legend=2)
     laws = plot_area(below, top=ONE_ROW)
-    for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
-        law = Characteristic.from_ordinates(TABLE_1_KNOTS, state.ordinates)
-        laws.plot(KAPPA, 1e3 * law.f(KAPPA), color=colour, lw=1.4, label=_named(fit, number, words))
+    found = [Characteristic.from_ordinates(TABLE_1_KNOTS, state.ordinates) for state in fit.history]
+    _iterations(laws, KAPPA, [1e3 * law.f(KAPPA) for law in found], words)
     _truth(laws, words)
     return finish(laws, words, x=words("axis_kappa"), y=STIFFNESS, legend=3)
 
@@ -70,8 +70,7 @@ def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
     )
     bends = plot_area(below, top=ONE_ROW)
     s = 1e3 * fit.steps[-1].s
-    for number, (state, colour) in enumerate(zip(fit.history, step_colours(len(fit.history)), strict=True)):
-        bends.plot(s, state.steps[-1].kappa, color=colour, lw=1.4, label=_named(fit, number, words))
+    _iterations(bends, s, [state.steps[-1].kappa for state in fit.history], words)
     bends.plot(s, fit.steps[-1].kappa, color=LIGHT["measured"], ls=":", label=words("paper_table"))
     return finish(bends, words, x=words("axis_s"), y=words("paper_bend"), legend=3)
 
@@ -103,9 +102,11 @@ def draw_difference(cause: Difference, words: Words, figure: Area) -> Axes:
     return finish(axes, words, x=words("axis_kappa"), y=STIFFNESS, legend=3)
 
 
-def _named(fit: PaperFit, iteration: int, words: Words) -> str | None:
-    """Name of an iteration in a legend: of the first and the last; between them colours go from dark to bright."""
-    return {0: words("paper_start"), fit.iterations: words("paper_end")}.get(iteration)
+def _iterations(axes: Axes, x: Array, curves: list[Array], words: Words) -> None:
+    """A curve an iteration, from dark to bright; the first and the last have a name in the legend."""
+    names = {0: words("paper_start"), len(curves) - 1: words("paper_end")}
+    for number, (curve, colour) in enumerate(zip(curves, step_colours(len(curves)), strict=True)):
+        axes.plot(x, curve, color=colour, lw=1.4, label=names.get(number))
 
 
 def _halves(figure: Area) -> list[Area]:

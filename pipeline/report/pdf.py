@@ -37,6 +37,7 @@ LETTER = 0.52
 DOTS_PER_INCH = 150
 # Figures of half the page's width beside letters of 10 pt.
 SMALL = 0.75
+HALVES = ((0.0, 0.5), (0.5, 1.0))
 
 
 class Sheet:
@@ -68,17 +69,17 @@ class Sheet:
             if self.room() > 24.0:
                 self.text(f"{name}: {text}", size=size)
 
-    def part(self, height: float, *, left: float = 0.0, right: float = 1.0, advance: bool = True) -> Area:
-        """Room for a figure below what stands on the page; ``left`` and ``right`` are shares of the page's width."""
-        inner = PAGE[0] - 2.0 * MARGIN
-        x0, x1 = (MARGIN + share * inner for share in (left, right))
-        # a part of a figure takes its place from the ratios of its grid alone: the part is the middle of nine fields
-        grid = self.figure.add_gridspec(
-            3, 3, width_ratios=(x0, x1 - x0, PAGE[0] - x1), height_ratios=(self.y, height, PAGE[1] - self.y - height)
-        )
-        if advance:
-            self.y += height + 8.0
-        return self.figure.add_subfigure(grid[1, 1])
+    def parts(self, height: float, *spans: tuple[float, float], gap: float = 8.0) -> list[Area]:
+        """Room for figures beside each other below what stands on the page; spans are shares of the page's width."""
+        inner, heights, areas = PAGE[0] - 2.0 * MARGIN, (self.y, height, PAGE[1] - self.y - height), list[Area]()
+        for left, right in spans:
+            x0, x1 = MARGIN + left * inner, MARGIN + right * inner
+            # a part of a figure takes its place from the ratios of its grid alone: it is the middle of nine fields
+            widths = (x0, x1 - x0, PAGE[0] - x1)
+            grid = self.figure.add_gridspec(3, 3, width_ratios=widths, height_ratios=heights)
+            areas.append(self.figure.add_subfigure(grid[1, 1]))
+        self.y += height + gap
+        return areas
 
     def room(self) -> float:
         """Height left on the page in points."""
@@ -127,7 +128,8 @@ def answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
     sheet, said = Sheet(_head(result)), first_screen(result, words)
     sheet.text(said.sentence, size=14.0, bold=True)
     if curves(result):
-        figures.draw_characteristic(sheet.part(240.0, left=0.04, right=0.96), result, words)
+        (area,) = sheet.parts(240.0, (0.04, 0.96))
+        figures.draw_characteristic(area, result, words)
         sheet.text(words("convention", coverage=words.number(100.0 * words.coverage)), color=LIGHT["muted"])
         if said.doubt:
             sheet.text(said.doubt, bold=True)
@@ -176,17 +178,17 @@ def _mechanics_sheet(result: Result, words: Words) -> Sheet:
     """Forces with their table, moment curve, curvatures, residual map."""
     sheet = Sheet(_head(result))
     sheet.text(words("nav_mechanics"), size=13.0, bold=True)
+    left, right = sheet.parts(270.0, (0.0, 0.52), (0.52, 1.0))
     if result.steps:
-        figures.draw_forces(sheet.part(270.0, right=0.52, advance=False), result, words)
+        figures.draw_forces(left, result, words)
     if curves(result):
-        figures.draw_moment(sheet.part(270.0, left=0.52, advance=False), result, words)
-    sheet.y += 278.0
-    curved, residuals = any(photo.kappa_per_m for photo in result.photos), maps.answer_map(result)
-    if curved:
-        figures.draw_curvatures(sheet.part(230.0, right=0.5, advance=False), result, words)
-    if residuals is not None:
-        maps.draw_map(sheet.part(230.0, left=0.5, advance=False), residuals, words, title=words("fig_map"))
-    sheet.y += 236.0 if curved or residuals is not None else 0.0
+        figures.draw_moment(right, result, words)
+    residuals = maps.answer_map(result)
+    if any(photo.kappa_per_m for photo in result.photos):  # a photo without them leaves no residuals
+        left, right = sheet.parts(230.0, *HALVES, gap=6.0)
+        figures.draw_curvatures(left, result, words)
+        if residuals is not None:
+            maps.draw_map(right, residuals, words, title=words("fig_map"))
     unit = figures.force_unit(result, words).symbol
     heads = [words("col_step"), words("col_branch"), words("col_displacement")]
     heads += [words(key, unit=unit) for key in ("col_force", "col_force_fit", "col_residual")] + [words("col_sigma")]
@@ -198,7 +200,8 @@ def _mechanics_sheet(result: Result, words: Words) -> Sheet:
 
 def _grid(sheet: Sheet, heads: list[str], rows: list[list[str]]) -> None:
     """A table over the width of the page."""
-    axes = sheet.part(13.0 * (len(rows) + 1), advance=True).add_axes((0.0, 0.0, 1.0, 1.0))
+    (area,) = sheet.parts(13.0 * (len(rows) + 1), (0.0, 1.0))
+    axes = area.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     table = axes.table(cellText=rows, colLabels=heads, loc="center", cellLoc="right", edges="horizontal")
     table.auto_set_font_size(False)
@@ -217,10 +220,9 @@ def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
     for index in range(0, len(shown), 2):
         row = shown[index : index + 2]
         height = photos.PICTURE_HEAD + max(_height(photo) for photo in row)
-        for column, photo in enumerate(row):
-            part = sheet.part(height, left=0.5 * column, right=0.5 * column + 0.48, advance=False)
-            photos.draw_photo(part, photo, words)
-        sheet.y += height + 4.0
+        areas = sheet.parts(height, *((0.0, 0.48), (0.5, 0.98))[: len(row)], gap=4.0)
+        for area, photo in zip(areas, row, strict=True):
+            photos.draw_photo(area, photo, words)
     if not pictures:
         sheet.text(words("photo_none"))
     if len(pictures) > len(shown):
@@ -254,13 +256,13 @@ def _diagnosis_sheet(result: Result, part: DiagnosisPart, view: DiagnosisView, w
         sheet.text(line)
     if part.table:
         height = min(ranking.ranking_height(part), 280.0)
-        ranking.draw_ranking(sheet.part(height, left=0.05, right=0.95), part, words)
+        (area,) = sheet.parts(height, (0.05, 0.95))
+        ranking.draw_ranking(area, part, words)
     before, after = part.residuals_before, part.residuals_after
     if before is not None and after is not None:
-        for place, (residuals, title) in enumerate(((before, "fig_map_before"), (after, "fig_map_after"))):
-            area = sheet.part(165.0, left=0.5 * place, right=0.5 * place + 0.5, advance=False)
-            maps.draw_map(area, residuals, words, title=words(title))
-        sheet.y += 170.0
+        left, right = sheet.parts(165.0, *HALVES, gap=5.0)
+        maps.draw_map(left, before, words, title=words("fig_map_before"))
+        maps.draw_map(right, after, words, title=words("fig_map_after"))
     texts = [(words("next_experiment"), view.next_what)] if view.next_what else []
     texts += [(words("blind_spots"), line) for line in view.blind_spots]
     sheet.pairs(texts, size=8.5)

@@ -27,10 +27,6 @@ def ranked(diagnosis: DiagnosisPart) -> list[CauseRow]:
     return sorted(diagnosis.table, key=lambda row: (impossible(row), row.p_adjusted, -abs(row.z)))
 
 
-def _colour(row: CauseRow, named: set[str]) -> str:
-    return "alarm" if row.name in named else "grid" if impossible(row) else "muted"
-
-
 def ranking_height(diagnosis: DiagnosisPart) -> float:
     """Height of the figure in px."""
     return 54.0 + ROW_PX * len(diagnosis.table)
@@ -45,7 +41,8 @@ def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words) -> Axes:
     middle = left + 0.5 * (width - left - 12.0)
     pull = plot_area(figure, left=left, right=width - middle + 6.0, top=8.0)
     impact = plot_area(figure, left=middle + 6.0, top=8.0)
-    colours = [LIGHT[_colour(row, named)] for row in rows]
+    roles = ("alarm" if row.name in named else "grid" if impossible(row) else "muted" for row in rows)
+    colours = [LIGHT[role] for role in roles]
     places = range(len(rows))
     pull.axvspan(-NOISE, NOISE, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
     pull.barh(places, [row.z for row in rows], color=colours, height=0.62)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import groupby
 
 import numpy as np
 
@@ -52,10 +51,11 @@ class Repeats:
 
 def by_type(rows: list[IndexRow]) -> list[tuple[str, list[tuple[int, RowCurve]]]]:
     """Usable rows with a type and a curve, with their numbers: type by type, most specimens first."""
-    curves = [(row.type, i, row.curve) for i, row in enumerate(rows) if row.usable and row.type and row.curve]
-    ordered = sorted(curves, key=lambda entry: entry[:2])
-    groups = [(name, [(i, curve) for _, i, curve in group]) for name, group in groupby(ordered, key=lambda e: e[0])]
-    return sorted(groups, key=lambda group: -len(group[1]))
+    groups: dict[str, list[tuple[int, RowCurve]]] = {}
+    for number, row in enumerate(rows):
+        if row.usable and row.type and row.curve:
+            groups.setdefault(row.type, []).append((number, row.curve))
+    return sorted(groups.items(), key=lambda group: (-len(group[1]), group[0]))
 
 
 def without_outlying(rows: list[IndexRow]) -> list[IndexRow]:
