@@ -48,11 +48,13 @@ def read_settings(file: Path | None, assignments: Sequence[str]) -> Settings:
 def _wrong_value(place: Sequence[str], value: Any, why: Message, source: TomlFile | None) -> InputError:
     """The error for a setting that cannot have this value."""
     told = {"name": ".".join(place), "value": shown(value), "why": why, "default": _default(place)}
-    return InputError(
-        Message("settings/wrong-value", **told),
-        path=None if source is None else source.path,
-        line=None if source is None or len(place) < 2 else source.line_of(".".join(place[:-1]), place[-1]),
-    )
+    return _error(Message("settings/wrong-value", **told), source, place)
+
+
+def _error(said: Message, source: TomlFile | None, place: Sequence[str]) -> InputError:
+    """The error for a setting, at its line if a file has it."""
+    *above, name = place
+    return InputError(said) if source is None else source.error(said, table=".".join(above), key=name)
 
 
 def _default(place: Sequence[str]) -> str:
@@ -69,14 +71,10 @@ def _check_tables(
     """Refuse names that are no settings, and integers that are none of TOML, at any depth."""
     for name, value in values.items():
         if name not in model.model_fields:
-            place, full = ".".join(above), ".".join((*above, name))
             near = nearest(name, tuple(model.model_fields))
             key = "settings/unknown-key" if near else "settings/unknown-key.far"
-            raise InputError(
-                Message(key, name=full, near=".".join((*above, near or ""))),
-                path=None if source is None else source.path,
-                line=None if source is None else source.line_of(place, name) or source.line_of(full),
-            )
+            said = Message(key, name=".".join((*above, name)), near=".".join((*above, near or "")))
+            raise _error(said, source, (*above, name))
         if isinstance(value, int) and abs(value) > LARGEST:
             raise _wrong_value((*above, name), value, Message("settings/wrong-value.larger"), source)
         inner = model.model_fields[name].annotation

@@ -69,14 +69,12 @@ def faults_of_input(test: MeasuredTest) -> Faults:
     return found
 
 
-def _logged(
-    test: MeasuredTest, *, without: frozenset[int] = frozenset(), loaded: bool = False
-) -> tuple[list[int], Array, Array]:
+def _logged(found: Faults, *, loaded: bool = False) -> tuple[list[int], Array, Array]:
     """Steps (n,) with a chord on a photo and a displacement in the log: their indices, displacements and chords (m)."""
     both = [
         (i, step.displacement, step.chord)
-        for i, step in enumerate(test.steps)
-        if step.chord is not None and step.displacement is not None and i not in without
+        for i, step in enumerate(found.test.steps)
+        if step.chord is not None and step.displacement is not None and i not in found.photos
         if not loaded or step.branch != "mounted"
     ]
     _, displacement, chord = np.array(both, dtype=float).reshape(-1, 3).T
@@ -85,7 +83,7 @@ def _logged(
 
 def _unit_of_displacement(found: Faults) -> Faults:
     """The chord changes by another factor than one per displacement: a unit."""
-    test, (used, displacement, chord) = found.test, _logged(found.test, without=found.photos)
+    test, (used, displacement, chord) = found.test, _logged(found)
     if len(used) < 2 or np.ptp(displacement) <= 0.0 or np.ptp(chord) <= 0.0:
         return Faults(test)
     slope, at_zero = np.polyfit(displacement, chord, 1)
@@ -105,7 +103,7 @@ def _doubled_photos(found: Faults) -> Faults:
     """Two photos from files of the same contents, or whose noise is the same, are one photo."""
     steps = found.test.steps
     pictures = [(i, step.shape) for i, step in enumerate(steps) if step.shape is not None]
-    findings, dropped, gap = [], set(), _mismatch(found.test)
+    findings, dropped, gap = [], set(), _mismatch(found)
     for (i, one), (j, other) in combinations(pictures, 2):
         assert one is not None and other is not None
         same_file = steps[i].picture is not None and steps[i].picture == steps[j].picture
@@ -137,9 +135,9 @@ def _scatter(shape: MeasuredShape) -> float:
     return float(np.sqrt(np.mean((-np.sin(theta) * dx + np.cos(theta) * dy) ** 2)))
 
 
-def _mismatch(test: MeasuredTest) -> dict[int, float]:
+def _mismatch(found: Faults) -> dict[int, float]:
     """How far chord plus displacement of each step lies from the median of all, m."""
-    used, displacement, chord = _logged(test)
+    used, displacement, chord = _logged(found)
     sums = displacement + chord
     return dict(zip(used, np.abs(sums - np.median(sums)).tolist() if used else [], strict=True))
 
@@ -151,7 +149,7 @@ def _order_of_photos(found: Faults) -> Faults:
     and a yielding frame change nothing of that. Steps of one displacement (up and down) cannot be told apart by it: a
     photo that may be of either is left out.
     """
-    used, displacement, _ = _logged(found.test, without=found.photos)
+    used, displacement, _ = _logged(found)
     travel = float(np.ptp(displacement)) if used else 0.0
     whole = _put_in_order(found.test, used, MISMATCH * travel)
     if whole.findings:
@@ -213,7 +211,7 @@ def _displacement(found: Faults) -> Faults:
 
     The force-free step is none of them: play and a yielding frame set it apart from all others.
     """
-    test, (used, displacement, chord) = found.test, _logged(found.test, without=found.photos, loaded=True)
+    test, (used, displacement, chord) = found.test, _logged(found, loaded=True)
     if len(used) < 4:
         return Faults(test)
     sums = chord + displacement
@@ -232,7 +230,7 @@ def _displacement(found: Faults) -> Faults:
 
 def _moving_apart(found: Faults) -> Faults:
     """The bearings move apart on the photos where the log pushes them together."""
-    used, displacement, chord = _logged(found.test, without=found.photos)
+    used, displacement, chord = _logged(found)
     if len(used) < 3:
         return Faults(found.test)
     moved, chord = displacement - displacement.mean(), chord - chord.mean()

@@ -8,7 +8,7 @@ bearing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipeline.intake.access import read_bytes
@@ -60,18 +60,20 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings, length: 
     samples, columns = read_samples(rows, columns, spec, path=path, length=length)
     steps, findings = load_steps(samples, spec, path=path, settings=settings)
     check_response(steps, path=path)
-    return ForceLog(steps, (*_reading(columns, encoding, path), *samples.findings, *findings))
+    noted = (*_reading(columns, encoding), *samples.findings, *findings)
+    placed = (replace(one, said=Message(one.said.key, file=path.name, **one.said.values)) for one in noted)
+    return ForceLog(steps, tuple(placed))
 
 
-def _reading(columns: Columns, encoding: str, path: Path) -> list[Finding]:
+def _reading(columns: Columns, encoding: str) -> list[Finding]:
     """What was inferred about the notation."""
     findings = []
     if encoding == "cp1252":
-        findings.append(inferred("log/encoding-inferred", file=path.name))
+        findings.append(inferred("log/encoding-inferred"))
     if columns.skipped_lines:
-        findings.append(inferred("log/metadata", file=path.name, line=columns.header_line))
+        findings.append(inferred("log/metadata", line=columns.header_line))
     assumed = {role: unit.name for role, unit in columns.units.items() if unit.assumed}
     if assumed:
         taken = [Message("log/unit-assumed.role", role=role, unit=name) for role, name in assumed.items()]
-        findings.append(inferred("log/unit-assumed", file=path.name, taken=taken))
+        findings.append(inferred("log/unit-assumed", taken=taken))
     return findings

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -72,58 +72,50 @@ def load_steps(
     Raises `InputError` ``log/swapped-columns`` if the force is constant in every hold while the displacement scatters,
     ``log/too-many-steps``.
     """
-    name = path.name
-    displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
+    read = samples
+    samples, tolerance, runs, grouped = _grouped(read, path, settings)
     left_out: list[Finding] = []
-    while len(left_out) < WILD_ROUNDS and (wild := _wild(samples.forces, runs)):
-        line, force = samples.lines[wild[0]], float(samples.forces[wild[0]])
-        left_out.append(doubtful("log/wild-force", file=name, count=len(wild), line=line, force_N=force))
-        samples = samples.without(wild)
-        displacements, tolerance, runs, grouped = _grouped(samples, path, settings)
+    while len(left_out) < WILD_ROUNDS and (wild := _wild(read.forces, runs)):
+        line, force = read.lines[wild[0]], float(read.forces[wild[0]])
+        left_out.append(doubtful("log/wild-force", count=len(wild), line=line, force_N=force))
+        read = read.without(wild)
+        samples, tolerance, runs, grouped = _grouped(read, path, settings)
     places = hold_places(
-        [displacements[run.rows] for run in runs],
+        [samples.displacements[run.rows] for run in runs],
         [np.isin(np.arange(run.first, run.last), _rows_with_photo(samples, run)) for run in runs],
     )
     positions = places.place
     same = max(tolerance, SAME * max((std for std in places.std if std is not None), default=0.0))
     means = np.array([float(np.mean(samples.forces[run.rows])) for run in runs])
-    sign, signed = force_sign(means, np.array(positions), spec, name=name)
+    sign, signed = force_sign(means, np.array(positions), spec)
     forces = sign * samples.forces
     holds = [_hold(samples, forces, run) for run in runs]
     fitted = hold_forces(holds, resolution=samples.resolution, settings=settings)
     if samples.branches is None:
-        branches, directed = inferred_branches(positions, fitted.force, same, name=name)
+        branches, directed = inferred_branches(positions, fitted.force, same)
     else:
         branches, directed = [samples.branches[run.first] for run in runs], []
     steps = _steps(samples, runs, branches, places, holds, fitted)
-    within = _hold_findings(samples, displacements, runs, max(5.0 * tolerance, SPREAD * places.sigma), name)
-    order = order_findings(steps, same, name=name)
-    return steps, (
-        *left_out,
-        *grouped,
-        *signed,
-        *directed,
-        *_fit_findings(fitted, places, tolerance, name, settings),
-        *within,
-        *order,
-    )
+    how = _fit_findings(fitted, places, tolerance, settings)
+    within = _hold_findings(samples, runs, max(5.0 * tolerance, SPREAD * places.sigma))
+    return steps, (*left_out, *grouped, *signed, *directed, *how, *within, *_order_findings(steps, same))
 
 
 def _grouped(
     samples: Samples, path: Path, settings: IntakeSettings
-) -> tuple[Array, float, list[Run], tuple[Finding, ...]]:
-    """Signed displacements (n,) m, how close to each other they are one place (m), the holds, and what was inferred."""
-    name = path.name
+) -> tuple[Samples, float, list[Run], tuple[Finding, ...]]:
+    """The samples with signed displacements, how close these are one place (m), the holds, and what was inferred."""
     travel = float(np.ptp(samples.displacements)) or float(abs(samples.displacements[0])) or 1.0
     tolerance = ONE_PLACE * travel
     mounted = _mounted(samples, tolerance)
-    displacements, moved = from_mounted(samples.displacements, mounted, name, travel=travel)
-    displacements, turned = signed_displacements(displacements, name)
-    runs, found = _runs(samples, displacements, tolerance, name=name)
+    displacements, moved = from_mounted(samples.displacements, mounted, travel)
+    displacements, turned = signed_displacements(displacements)
+    samples = replace(samples, displacements=displacements)
+    runs, found = _runs(samples, tolerance)
     if len(runs) > settings.steps_max:  # a ramp without holds, or a step column that counts the rows
         raise InputError(Message("log/too-many-steps", steps=len(runs), limit=settings.steps_max), path=path)
     _check_swapped(samples, runs, path)
-    return displacements, tolerance, runs, (*moved, *turned, *found)
+    return samples, tolerance, runs, (*moved, *turned, *found)
 
 
 def _steps(
@@ -167,13 +159,13 @@ def _mounted(samples: Samples, tolerance: float) -> NDArray[np.bool_]:
     return np.asarray(first & free)
 
 
-def _runs(samples: Samples, displacements: Array, tolerance: float, *, name: str) -> tuple[list[Run], list[Finding]]:
+def _runs(samples: Samples, tolerance: float) -> tuple[list[Run], list[Finding]]:
     """Holds in the order of the log, with unique step numbers."""
-    branches = samples.branches or ("",) * len(samples.lines)
+    branches, displacements = samples.branches or ("",) * len(samples.lines), samples.displacements
     if samples.steps is not None:
         marks = list(zip(samples.steps, branches, strict=True))
         starts = [0, *(row for row in range(1, len(marks)) if marks[row] != marks[row - 1])]
-        return _numbered(samples, starts, displacements, tolerance, name)
+        return _numbered(samples, starts, tolerance)
     starts = [0]
     for row in range(1, len(displacements)):
         moved = abs(displacements[row] - displacements[starts[-1]]) > tolerance
@@ -185,7 +177,7 @@ def _runs(samples: Samples, displacements: Array, tolerance: float, *, name: str
     held = [pair for pair, keep in zip(stretches, long | named, strict=True) if keep] if long.any() else stretches
     key = "log/steps-inferred.way" if len(held) < len(stretches) else "log/steps-inferred"
     runs = [Run(first, last, number) for number, (first, last) in enumerate(held)]
-    return runs, [inferred(key, file=name, steps=len(held), others=len(stretches) - len(held))]
+    return runs, [inferred(key, steps=len(held), others=len(stretches) - len(held))]
 
 
 def _held(stretches: Sequence[tuple[int, int]], displacements: Array, tolerance: float) -> NDArray[np.bool_]:
@@ -204,24 +196,22 @@ def _held(stretches: Sequence[tuple[int, int]], displacements: Array, tolerance:
     return held
 
 
-def _numbered(
-    samples: Samples, starts: Sequence[int], displacements: Array, tolerance: float, name: str
-) -> tuple[list[Run], list[Finding]]:
+def _numbered(samples: Samples, starts: Sequence[int], tolerance: float) -> tuple[list[Run], list[Finding]]:
     """Holds by the step column; numbers that are missing or come back are replaced by the order of the log."""
-    labels = samples.steps or ()
+    labels, displacements = samples.steps or (), samples.displacements
     pairs = list(pairwise([*starts, len(labels)]))
     numbers = [_number(labels[first]) for first in starts]
     known = [number for number in numbers if number is not None]
     if len(set(known)) == len(numbers):
         return [Run(*pair, number) for pair, number in zip(pairs, known, strict=True)], []
-    noted = [inferred("log/steps-renumbered", file=name)]
+    noted = [inferred("log/steps-renumbered")]
     begun: dict[int, int] = {}
     for again, number in zip(starts, numbers, strict=True):
         if number is None or begun.setdefault(number, again) == again:
             continue
         first = begun[number]
         if abs(displacements[again] - displacements[first]) > tolerance:
-            place = {"file": name, "line": samples.lines[first], "again": samples.lines[again], "step": number}
+            place = {"line": samples.lines[first], "again": samples.lines[again], "step": number}
             at = {"one_m": displacements[first], "other_m": displacements[again]}
             noted.append(doubtful("steps/doubled", **place, **at))
     return [Run(*pair, number) for number, pair in enumerate(pairs)], noted
@@ -275,26 +265,24 @@ def _wild(forces: Array, runs: Sequence[Run]) -> list[int]:
 
 
 def _fit_findings(
-    fitted: HoldForces, places: HoldPlaces, tolerance: float, name: str, settings: IntakeSettings
+    fitted: HoldForces, places: HoldPlaces, tolerance: float, settings: IntakeSettings
 ) -> Iterator[Finding]:
     """Findings on how forces and their errors were taken from the holds, and on displacements that scatter."""
     if fitted.degree:
-        yield inferred("log/trend", file=name, degree=fitted.degree)
+        yield inferred("log/trend", degree=fitted.degree)
     if not fitted.sampled:
         share = settings.force_std_relative
-        yield inferred("log/force-std", file=name, share=share, std_N=float(fitted.std[0]))
+        yield inferred("log/force-std", share=share, std_N=float(fitted.std[0]))
     if places.sigma > tolerance:  # by more than the difference that makes a new hold
         largest = max(std for std in places.std if std is not None)
-        yield inferred("log/displacement-noise", file=name, scatter_m=places.sigma, std_m=largest)
+        yield inferred("log/displacement-noise", scatter_m=places.sigma, std_m=largest)
 
 
-def _hold_findings(
-    samples: Samples, displacements: Array, runs: Sequence[Run], most: float, name: str
-) -> Iterator[Finding]:
+def _hold_findings(samples: Samples, runs: Sequence[Run], most: float) -> Iterator[Finding]:
     """Contradictions within a hold: a displacement that moves by more than ``most`` (m), more than one photo."""
     for run in runs:
-        place = {"file": name, "line": samples.lines[run.first], "step": run.step}
-        spread = float(np.ptp(displacements[run.rows]))
+        place = {"line": samples.lines[run.first], "step": run.step}
+        spread = float(np.ptp(samples.displacements[run.rows]))
         if spread > most:
             yield doubtful("steps/displacement-spread", spread_m=spread, **place)
         images = list(dict.fromkeys(image for image in samples.images[run.rows] if image))
@@ -303,11 +291,11 @@ def _hold_findings(
             yield doubtful("photo/several", count=len(images), taken=taken, other=other, **place)
 
 
-def order_findings(steps: Sequence[LoadStep], tolerance: float, *, name: str) -> Iterator[Finding]:
+def _order_findings(steps: Sequence[LoadStep], tolerance: float) -> Iterator[Finding]:
     """Contradictions between neighbouring steps; displacements closer than ``tolerance`` (m) are equal."""
     for before, after in pairwise(steps):
         change = after.displacement_m - before.displacement_m
-        place = {"file": name, "line": after.line, "step": after.step, "before": before.step}
+        place = {"line": after.line, "step": after.step, "before": before.step}
         way = {"from_m": before.displacement_m, "to_m": after.displacement_m}
         if after.branch == before.branch and abs(change) <= tolerance:
             yield doubtful("steps/doubled.place", **place, **way)
@@ -318,4 +306,4 @@ def order_findings(steps: Sequence[LoadStep], tolerance: float, *, name: str) ->
     for step in steps:
         if step.branch == "mounted" and abs(step.displacement_m) > tolerance:
             at = step.displacement_m
-            yield doubtful("steps/branch.mounted", file=name, line=step.line, step=step.step, displacement_m=at)
+            yield doubtful("steps/branch.mounted", line=step.line, step=step.step, displacement_m=at)

@@ -138,24 +138,22 @@ def read_samples(
         branches=None if branches is None else tuple(branches[row] for row in kept),
         images=tuple(images[row] for row in kept),
         resolution=columns.units["force"].factor * 10.0 ** -min(max(places, -300), 300),
-        findings=(*_losses(path.name, lines, force, carried, read.summary), *noted),
+        findings=(*_losses(lines, force, carried, read.summary), *noted),
     )
     return samples, columns
 
 
-def _losses(
-    name: str, lines: Sequence[int], force: Sequence[str], carried: int, summary: Sequence[int]
-) -> list[Finding]:
+def _losses(lines: Sequence[int], force: Sequence[str], carried: int, summary: Sequence[int]) -> list[Finding]:
     """Rows that are no samples, rows without a force, and displacements carried down."""
     findings = []
     if summary:
-        findings.append(doubtful("log/summary", file=name, line=summary[0], count=len(summary)))
+        findings.append(doubtful("log/summary", line=summary[0], count=len(summary)))
     empty = [row for row, cell in enumerate(force) if is_missing(cell)]
     if empty:
         first = lines[empty[0]]
-        findings.append(doubtful("log/missing-force", file=name, count=len(empty), rows=len(force), line=first))
+        findings.append(doubtful("log/missing-force", count=len(empty), rows=len(force), line=first))
     if carried:
-        findings.append(inferred("log/carried-down", file=name, count=carried))
+        findings.append(inferred("log/carried-down", count=carried))
     return findings
 
 
@@ -223,24 +221,24 @@ def _branches(cells: Sequence[str], lines: Sequence[int], path: Path) -> list[Br
 
 def _times(cells: Sequence[str], kept: Sequence[int], numbers: _Numbers) -> tuple[Array | None, list[Finding]]:
     """Times of the kept rows in s, relative to the first if they are clock times or count from an epoch."""
-    name, lines = numbers.path.name, numbers.lines
+    lines = numbers.lines
     empty = [row for row in kept if is_missing(cells[row])]
     if empty:
         level = inferred if len(empty) == len(kept) else doubtful
-        return None, [level("log/missing-time", file=name, count=len(empty), line=lines[empty[0]])]
+        return None, [level("log/missing-time", count=len(empty), line=lines[empty[0]])]
     clock = [time for row in kept if (time := clock_s(cells[row])) is not None]
     if len(clock) == len(kept):
         times = through_midnight(np.array(clock))
     elif not clock and not any(to_number(cells[row], numbers.decimal) is not None for row in kept):
-        return None, [doubtful("log/time-format", file=name, cell=repr(cells[kept[0]][:40]))]
+        return None, [doubtful("log/time-format", cell=repr(cells[kept[0]][:40]))]
     else:
         wide = replace(numbers, limit=1e15)  # epochs in milliseconds have 13 digits
         times = wide.column("time", cells, kept)
     noted = []
     if clock or float(np.max(np.abs(times))) > EPOCH_S:
-        noted.append(inferred("log/clock-time", file=name))
+        noted.append(inferred("log/clock-time"))
         times = times - times[0]
     if np.any(np.diff(times) < 0.0):
         line = lines[kept[int(np.argmax(np.diff(times) < 0.0)) + 1]]
-        return None, [doubtful("log/time-order", file=name, line=line)]
+        return None, [doubtful("log/time-order", line=line)]
     return times, noted

@@ -24,9 +24,7 @@ AGREED = 0.75
 """Of the loaded steps; so many of one sign decide the sign of the log."""
 
 
-def from_mounted(
-    displacements: Array, mounted: NDArray[np.bool_], name: str, *, travel: float
-) -> tuple[Array, list[Finding]]:
+def from_mounted(displacements: Array, mounted: NDArray[np.bool_], travel: float) -> tuple[Array, list[Finding]]:
     """Displacements counted from the mounted cable where the log counts from the end stop of the machine.
 
     Parameters
@@ -42,18 +40,18 @@ def from_mounted(
     zero = float(np.median(displacements[mounted]))
     if abs(zero) <= travel:
         return displacements, []
-    return displacements - zero, [inferred("log/displacement-zero", file=name, zero_m=zero)]
+    return displacements - zero, [inferred("log/displacement-zero", zero_m=zero)]
 
 
-def signed_displacements(displacements: Array, name: str) -> tuple[Array, list[Finding]]:
+def signed_displacements(displacements: Array) -> tuple[Array, list[Finding]]:
     """Displacements (n,) m positive toward the other bearing; a log that counts downward is turned round."""
     reach = float(displacements[np.argmax(np.abs(displacements))])
     if reach >= 0.0:
         return displacements, []
-    return -displacements, [doubtful("log/displacement-sign", file=name, reach_m=reach)]
+    return -displacements, [doubtful("log/displacement-sign", reach_m=reach)]
 
 
-def force_sign(forces: Array, displacements: Array, spec: LogSpec, *, name: str) -> tuple[float, list[Finding]]:
+def force_sign(forces: Array, displacements: Array, spec: LogSpec) -> tuple[float, list[Finding]]:
     """Factor 1 or -1 that makes compression positive: as the user says, unless a bent cable would pull by it.
 
     Parameters
@@ -72,7 +70,6 @@ def force_sign(forces: Array, displacements: Array, spec: LogSpec, *, name: str)
     if np.mean(pulling) < AGREED:
         return said, []
     told = {
-        "file": name,
         "pulling": np.count_nonzero(pulling),
         "bent": pulling.size,
         "median_N": float(np.median(forces[loud])),
@@ -83,7 +80,7 @@ def force_sign(forces: Array, displacements: Array, spec: LogSpec, *, name: str)
 
 
 def inferred_branches(
-    displacements: Sequence[float], forces: Sequence[float], tolerance: float, *, name: str
+    displacements: Sequence[float], forces: Sequence[float], tolerance: float
 ) -> tuple[list[Branch], list[Finding]]:
     """Branch of each hold by the order of its displacements (k,) m; those closer than ``tolerance`` (m) are equal."""
     branches: list[Branch] = []
@@ -99,4 +96,4 @@ def inferred_branches(
             branches.append("loading" if change > 0.0 else "unloading")
     each = dict.fromkeys(branches)
     counts = [Message("log/branch-inferred.count", count=branches.count(branch), branch=branch) for branch in each]
-    return branches, [inferred("log/branch-inferred", file=name, counts=counts)]
+    return branches, [inferred("log/branch-inferred", counts=counts)]

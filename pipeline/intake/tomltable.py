@@ -53,8 +53,9 @@ class TomlFile:
         return None
 
     def error(self, said: Message, *, table: str, key: str | None = None) -> InputError:
-        """An `InputError` at the line of a key."""
-        return InputError(said, path=self.path, line=self.line_of(table, key))
+        """An `InputError` at the line of a key, or of the table that it names."""
+        line = self.line_of(table, key) or self.line_of(".".join(filter(None, (table, key))))
+        return InputError(said, path=self.path, line=line)
 
 
 def read_toml(path: Path, *, limit: int) -> TomlFile:
@@ -93,7 +94,7 @@ def check_names(file: TomlFile, names: Collection[str], known: Collection[str], 
         near = nearest(name, known)
         key = f"toml/unknown-{'key' if table else 'table'}{'' if near else '.far'}"
         told = Message(key, name=shown(name), table=table, near=near, known=known)
-        wrong.note(InputError(told, path=file.path, line=file.line_of(table, name) or file.line_of(name)))
+        wrong.note(file.error(told, table=table, key=name))
     wrong.settle()
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.result.diagnosed import DiagnosisPart
-from pipeline.result.parts import AnswerPart, BalancePart, FindingPart, InversePart, Method
+from pipeline.result.parts import AnswerPart, FindingPart, Method, WayPart
 from pipeline.result.visited import Visited, html_table, visited
 
 if TYPE_CHECKING:
@@ -76,17 +76,14 @@ class Answer:
 
 def curves(result: Result) -> dict[str, Visited]:
     """Visited parts of all characteristics of a result, by method."""
-    inverse, balance, diagnosis = result.inverse, result.balance, result.diagnosis
-    parts = (
-        None if inverse is None else visited("inverse", inverse.curve, _rest(inverse)),
-        None if balance is None else visited("balance", balance.curve, _rest(balance)),
-        None if diagnosis is None else visited("extended", diagnosis.extended),
-    )
+    ways: tuple[tuple[Method, WayPart | None], ...] = (("inverse", result.inverse), ("balance", result.balance))
+    parts = [
+        visited(method, way.curve, (way.pre_curvature_per_m, way.pre_curvature_std_per_m))
+        for method, way in ways
+        if way is not None
+    ]
+    parts.append(visited("extended", result.diagnosis.extended if result.diagnosis else None))
     return {part.method: part for part in parts if part is not None}
-
-
-def _rest(part: InversePart | BalancePart) -> tuple[float | None, float | None]:
-    return part.pre_curvature_per_m, part.pre_curvature_std_per_m
 
 
 def refuted(diagnosis: DiagnosisPart | None) -> bool:
