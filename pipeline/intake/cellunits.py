@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.intake.columns import Columns, unit_of
@@ -20,7 +19,7 @@ WITH_UNIT = re.compile(r"(?P<number>[-+−]?[\d.,\s'’]*\d(?:[eE][-+]?\d+)?)\s*
 
 
 def without_units(
-    table: dict[str, list[str]], columns: Columns, *, path: Path, line: int | None
+    table: dict[str, list[str]], columns: Columns, *, line: int | None
 ) -> tuple[dict[str, list[str]], Columns]:
     """Cells (role -> cells) without their units, and the columns with them; ``line``: the first one of the table.
 
@@ -32,13 +31,13 @@ def without_units(
             continue
         cells, given = found
         try:
-            unit, header = unit_of(role, given, path, line), columns.units[role]
+            unit, header = unit_of(role, given, line), columns.units[role]
         except InputError:
             if role == "time":  # ``8:00 AM``: such times are left out, the test is not
                 continue
             raise
         if not header.assumed and unit.factor != header.factor:
-            raise InputError(Message("log/unit.cells", header=header.name, cells=given), path=path, line=line)
+            raise InputError(Message("log/unit.cells", header=header.name, cells=given), line=line)
         table = {**table, role: cells}
         columns = replace(columns, units={**columns.units, role: unit})
     return table, columns

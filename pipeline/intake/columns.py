@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 from pipeline.errors import InputError
@@ -87,7 +86,7 @@ class Columns:
     width: int
 
 
-def find_columns(text: str, spec: LogSpec, *, path: Path) -> tuple[Columns, Rows]:
+def find_columns(text: str, spec: LogSpec) -> tuple[Columns, Rows]:
     """Find the separator, the header and the meaning of the columns.
 
     Parameters
@@ -112,7 +111,7 @@ def find_columns(text: str, spec: LogSpec, *, path: Path) -> tuple[Columns, Rows
     best: tuple[int, int, str] | None = None
     for separator, head in heads.items():
         if not head:
-            raise InputError(Message("log/empty"), path=path)
+            raise InputError(Message("log/empty"))
         for row, (_, names) in enumerate(head):
             found = len(_roles(names, spec))
             if found > (best[0] if best else 1):
@@ -122,10 +121,10 @@ def find_columns(text: str, spec: LogSpec, *, path: Path) -> tuple[Columns, Rows
         # the columns may stand apart by what is no separator here
         apart = len(rows[0][1]) == 1 and re.search(r"\S(?:\s{2,}|\s*\|\s*)\S", rows[0][1][0])
         told = Message("log/no-header.apart" if apart else "log/no-header", first=column_names(rows))
-        raise InputError(told, path=path, line=rows[0][0])
+        raise InputError(told, line=rows[0][0])
     _, row, separator = best
     whole = Rows.of(text, separator)
-    return _columns(whole, row, spec, path), whole
+    return _columns(whole, row, spec), whole
 
 
 def _roles(header: list[str], spec: LogSpec) -> dict[str, list[int]]:
@@ -176,17 +175,17 @@ def _role(cell: str, name: str, unit: str) -> str | None:
     return None if role == "time" and unit.casefold() in TEMPERATURES else role
 
 
-def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:
+def _columns(rows: Rows, row: int, spec: LogSpec) -> Columns:
     line, header = rows[row]
     places = _roles(header, spec)
     for role in ("force", "displacement"):
         if role not in places:
-            raise InputError(Message("log/no-column", role=role, names=column_names([rows[row]])), path=path, line=line)
+            raise InputError(Message("log/no-column", role=role, names=column_names([rows[row]])), line=line)
     for role, where in places.items():
         if len(where) > 1:
             names = [header[place] for place in where]
             key = "log/ambiguous-column" if len(set(names)) > 1 else "log/ambiguous-column.same-name"
-            raise InputError(Message(key, names=map(repr, names), role=role), path=path, line=line)
+            raise InputError(Message(key, names=map(repr, names), role=role), line=line)
     index = {role: where[0] for role, where in places.items()}
     headless = isinstance(spec.columns.get("force"), int)
     below = rows[row + 1][1] if len(rows) > row + 1 else []
@@ -195,7 +194,7 @@ def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:
     for role in (role for role in MEASURED if role in index):
         in_name = "" if headless else _split_unit(header[index[role]])[1]
         in_row = _bare(below[index[role]]) if unit_row else ""
-        units[role] = unit_of(role, spec.units.get(role) or in_name or in_row, path, line)
+        units[role] = unit_of(role, spec.units.get(role) or in_name or in_row, line)
     return Columns(
         index=index,
         units=units,
@@ -207,7 +206,7 @@ def _columns(rows: Rows, row: int, spec: LogSpec, path: Path) -> Columns:
     )
 
 
-def unit_of(role: str, given: str, path: Path, line: int | None) -> LogUnit:
+def unit_of(role: str, given: str, line: int | None) -> LogUnit:
     """The unit of a column as given; capitals matter (mN, MN) unless only one reading exists (KN, MM, SEC).
 
     Raises `InputError` ``log/unit``.
@@ -218,7 +217,7 @@ def unit_of(role: str, given: str, path: Path, line: int | None) -> LogUnit:
     if len(alike) == 1:
         return LogUnit(name, alike.pop(), not given)
     told = Message("log/unit", unit=repr(unit), role=role, usual=ASSUMED[role], known=known)
-    raise InputError(told, path=path, line=line)
+    raise InputError(told, line=line)
 
 
 def _split_unit(cell: str) -> tuple[str, str]:

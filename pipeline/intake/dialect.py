@@ -14,7 +14,6 @@ import re
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from pipeline.errors import InputError
@@ -50,7 +49,7 @@ DIGITS = frozenset("0123456789")
 _SMOOTH = str.maketrans({" ": "", "\u00a0": "", "\u2009": "", "\u202f": "", "'": "", "’": "", "−": "-"})
 
 
-def decode(data: bytes, *, path: Path, encoding: str | None = None) -> tuple[str, str]:
+def decode(data: bytes, encoding: str | None = None) -> tuple[str, str]:
     """Text of a force log and the encoding it was read in.
 
     UTF-16 without byte order mark shows as zero bytes at every other place; text that is not UTF-8 is taken as cp1252,
@@ -60,16 +59,16 @@ def decode(data: bytes, *, path: Path, encoding: str | None = None) -> tuple[str
     """
     for begin, kind in OTHER_FILES.items():
         if data.startswith(begin):
-            raise InputError(Message("log/encoding.other-kind", kind=kind), path=path)
+            raise InputError(Message("log/encoding.other-kind", kind=kind))
     name = encoding or _guess(data)
     try:
         text = data.decode(name)
     except UnicodeDecodeError as error:
-        raise InputError(Message("log/encoding"), path=path) from error
+        raise InputError(Message("log/encoding")) from error
     # some programs fill their last block up, or end a text as CP/M did
     text = text.removeprefix("\ufeff").rstrip("\0\x1a")
     if "\0" in text:
-        raise InputError(Message("log/encoding"), path=path)
+        raise InputError(Message("log/encoding"))
     return text.replace("\r\n", "\n").replace("\r", "\n"), name
 
 
@@ -171,7 +170,6 @@ def is_missing(cell: str) -> bool:
 def decimal_sign(
     tokens: Iterable[str],
     *,
-    path: Path,
     separator: str,
     decimal: Decimal | None = None,
     others: Callable[[], Iterable[str]] = tuple,
@@ -221,7 +219,7 @@ def decimal_sign(
     values = [value for value in as_thousands if value is not None]
     if values and max(values) - min(values) > farthest:
         return mark
-    raise InputError(Message("log/ambiguous-decimal", number=repr(smooth(marked[0]))), path=path)
+    raise InputError(Message("log/ambiguous-decimal", number=repr(smooth(marked[0]))))
 
 
 def _decisive(cell: str) -> Decimal | None:

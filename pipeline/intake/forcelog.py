@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pipeline.errors import InputError
 from pipeline.intake.access import read_bytes
 from pipeline.intake.columns import Columns, find_columns
 from pipeline.intake.dialect import decode
@@ -53,16 +54,22 @@ def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings, length: 
         Codes ``file/...`` and ``log/...``: not readable, empty, no columns of force and displacement, a cell that is no
         number, a notation that can be read in two ways, a force that stands still.
     """
-    text, encoding = decode(
-        read_bytes(path, limit=settings.log_max_bytes, setting="log_max_bytes"), path=path, encoding=spec.encoding
-    )
-    columns, rows = find_columns(text, spec, path=path)
-    samples, columns = read_samples(rows, columns, spec, path=path, length=length)
-    steps, findings = load_steps(samples, spec, path=path, settings=settings)
-    check_response(steps, path=path)
-    noted = (*_reading(columns, encoding), *samples.findings, *findings)
-    placed = (replace(one, said=Message(one.said.key, file=path.name, **one.said.values)) for one in noted)
-    return ForceLog(steps, tuple(placed))
+    data = read_bytes(path, limit=settings.log_max_bytes, setting="log_max_bytes")
+    try:
+        log = _read(data, spec, settings, length)
+    except InputError as error:  # which file it is about is said here, once
+        raise InputError(error.said, path=path, line=error.line) from error
+    placed = (replace(one, said=Message(one.said.key, file=path.name, **one.said.values)) for one in log.findings)
+    return replace(log, findings=tuple(placed))
+
+
+def _read(data: bytes, spec: LogSpec, settings: IntakeSettings, length: float) -> ForceLog:
+    text, encoding = decode(data, spec.encoding)
+    columns, rows = find_columns(text, spec)
+    samples, columns = read_samples(rows, columns, spec, length=length)
+    steps, findings = load_steps(samples, spec, settings)
+    check_response(steps)
+    return ForceLog(steps, (*_reading(columns, encoding), *samples.findings, *findings))
 
 
 def _reading(columns: Columns, encoding: str) -> list[Finding]:

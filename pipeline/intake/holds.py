@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +64,7 @@ class Run:
 
 
 def load_steps(
-    samples: Samples, spec: LogSpec, *, path: Path, settings: IntakeSettings
+    samples: Samples, spec: LogSpec, settings: IntakeSettings
 ) -> tuple[tuple[LoadStep, ...], tuple[Finding, ...]]:
     """Group the samples into steps.
 
@@ -73,13 +72,13 @@ def load_steps(
     ``log/too-many-steps``.
     """
     read = samples
-    samples, tolerance, runs, grouped = _grouped(read, path, settings)
+    samples, tolerance, runs, grouped = _grouped(read, settings)
     left_out: list[Finding] = []
     while len(left_out) < WILD_ROUNDS and (wild := _wild(read.forces, runs)):
         line, force = read.lines[wild[0]], float(read.forces[wild[0]])
         left_out.append(doubtful("log/wild-force", count=len(wild), line=line, force_N=force))
         read = read.without(wild)
-        samples, tolerance, runs, grouped = _grouped(read, path, settings)
+        samples, tolerance, runs, grouped = _grouped(read, settings)
     places = hold_places(
         [samples.displacements[run.rows] for run in runs],
         [np.isin(np.arange(run.first, run.last), _rows_with_photo(samples, run)) for run in runs],
@@ -101,9 +100,7 @@ def load_steps(
     return steps, (*left_out, *grouped, *signed, *directed, *how, *within, *_order_findings(steps, same))
 
 
-def _grouped(
-    samples: Samples, path: Path, settings: IntakeSettings
-) -> tuple[Samples, float, list[Run], tuple[Finding, ...]]:
+def _grouped(samples: Samples, settings: IntakeSettings) -> tuple[Samples, float, list[Run], tuple[Finding, ...]]:
     """The samples with signed displacements, how close these are one place (m), the holds, and what was inferred."""
     travel = float(np.ptp(samples.displacements)) or float(abs(samples.displacements[0])) or 1.0
     tolerance = ONE_PLACE * travel
@@ -113,8 +110,8 @@ def _grouped(
     samples = replace(samples, displacements=displacements)
     runs, found = _runs(samples, tolerance)
     if len(runs) > settings.steps_max:  # a ramp without holds, or a step column that counts the rows
-        raise InputError(Message("log/too-many-steps", steps=len(runs), limit=settings.steps_max), path=path)
-    _check_swapped(samples, runs, path)
+        raise InputError(Message("log/too-many-steps", steps=len(runs), limit=settings.steps_max))
+    _check_swapped(samples, runs)
     return samples, tolerance, runs, (*moved, *turned, *found)
 
 
@@ -239,14 +236,14 @@ def _hold(samples: Samples, forces: Array, run: Run) -> Hold:
     return Hold(times, forces[run.rows], photo_time=float(np.mean(photo)) if rows else None)
 
 
-def _check_swapped(samples: Samples, runs: Sequence[Run], path: Path) -> None:
+def _check_swapped(samples: Samples, runs: Sequence[Run]) -> None:
     """Refuse a log whose force stands still to the last digit in every hold while its displacement scatters."""
     holds = [run.rows for run in runs if run.last - run.first > 2]
     if len(holds) < 2 or any(np.ptp(samples.forces[hold]) > 0.0 for hold in holds):
         return
     scatter = [float(np.ptp(samples.displacements[hold])) for hold in holds]
     if min(scatter) > 0.0 and np.ptp(samples.forces) > 0.0:
-        raise InputError(Message("log/swapped-columns", holds=len(holds), scatter_m=max(scatter)), path=path)
+        raise InputError(Message("log/swapped-columns", holds=len(holds), scatter_m=max(scatter)))
 
 
 def _wild(forces: Array, runs: Sequence[Run]) -> list[int]:

@@ -8,7 +8,6 @@ not. A cell that is saturated, unplugged or was never logged shows neither.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -26,7 +25,7 @@ FLAT = 2e-3
 length, for a travel of 2 % at least three times this."""
 
 
-def check_response(steps: Sequence[LoadStep], *, path: Path) -> None:
+def check_response(steps: Sequence[LoadStep]) -> None:
     """Refuse a log whose force stands still while the bearing moves; raises `InputError` ``log/force-stands-still``."""
     loaded = [step for step in steps if step.branch != "mounted"]
     still = steps if len(loaded) < len(steps) and _one_force(steps) else loaded
@@ -35,7 +34,7 @@ def check_response(steps: Sequence[LoadStep], *, path: Path) -> None:
         return
     force = float(np.mean([step.force_N for step in still]))
     way = {"from_mm": 1e3 * min(places), "to_mm": 1e3 * max(places)}
-    raise InputError(Message("log/force-stands-still", steps=len(still), force_N=force, **way), path=path)
+    raise InputError(Message("log/force-stands-still", steps=len(still), force_N=force, **way))
 
 
 def _one_force(steps: Sequence[LoadStep]) -> bool:

@@ -7,12 +7,10 @@ hold is carried down); cells that hold something else are refused with their lin
 from __future__ import annotations
 
 import bisect
-import math
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 
@@ -86,9 +84,7 @@ class Samples:
         )
 
 
-def read_samples(
-    rows: Rows, columns: Columns, spec: LogSpec, *, path: Path, length: float = math.inf
-) -> tuple[Samples, Columns]:
+def read_samples(rows: Rows, columns: Columns, spec: LogSpec, *, length: float) -> tuple[Samples, Columns]:
     """Convert the rows below the header; ``length`` (m) of the cable is farther than it was pushed.
 
     Returns
@@ -103,28 +99,27 @@ def read_samples(
         ``log/empty``, ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``,
         ``log/unit``.
     """
-    read = read_table(rows, columns, path)
+    read = read_table(rows, columns)
     lines = read.lines
-    table, columns = without_units(read.cells, columns, path=path, line=lines[0] if lines else None)
+    table, columns = without_units(read.cells, columns, line=lines[0] if lines else None)
     force = table["force"]
     displacement, carried = _carry_down(table["displacement"])
     kept = array("q", (row for row, cell in enumerate(force) if not is_missing(cell) and displacement[row]))
     if not kept:
-        raise InputError(Message("log/empty.no-row"), path=path)
+        raise InputError(Message("log/empty.no-row"))
     # columns that do not decide on the decimal sign: forces and displacements have, and step 1.2 is no number
     told = {columns.index[role] for role in ("force", "displacement", "step", "image") if role in columns.index}
     decimal = decimal_sign(
         chain(force, displacement),
-        path=path,
         separator=columns.separator,
         decimal=spec.decimal,
         others=lambda: read.others(told),
         travels=displacement,
         farthest=length / columns.units["displacement"].factor,
     )
-    numbers = _Numbers(decimal, columns, path, lines)
+    numbers = _Numbers(decimal, columns, lines)
     steps = _carry_down(table["step"])[0] if "step" in table else []
-    branches = _branches(table["branch"], lines, path) if "branch" in table else None
+    branches = _branches(table["branch"], lines) if "branch" in table else None
     times, noted = _times(table["time"], kept, numbers) if "time" in table else (None, [])
     images = _kept_images(table.get("image"), kept, len(lines))
     forces = numbers.column("force", force, kept)  # refuses what is no number, and has no decimals
@@ -163,7 +158,6 @@ class _Numbers:
 
     decimal: Decimal
     columns: Columns
-    path: Path
     lines: Sequence[int]
     limit: float = LARGEST
 
@@ -173,7 +167,7 @@ class _Numbers:
             key = "log/not-a-number" if number is None else "log/not-a-number.too-large"
             sign = "point" if self.decimal == "." else "comma"
             told = Message(key, role=role, cell=repr(cell[:40]), sign=sign)
-            raise InputError(told, path=self.path, line=self.lines[row])
+            raise InputError(told, line=self.lines[row])
         return number
 
     def column(self, role: str, cells: Sequence[str], kept: Sequence[int]) -> Array:
@@ -204,7 +198,7 @@ def _kept_images(cells: Sequence[str] | None, kept: Sequence[int], count: int) -
     return images
 
 
-def _branches(cells: Sequence[str], lines: Sequence[int], path: Path) -> list[Branch] | None:
+def _branches(cells: Sequence[str], lines: Sequence[int]) -> list[Branch] | None:
     """Branch of each row, or None if the column is empty."""
     filled, _ = _carry_down(cells)
     if not any(filled):
@@ -214,7 +208,7 @@ def _branches(cells: Sequence[str], lines: Sequence[int], path: Path) -> list[Br
     for line, cell in zip(lines, filled, strict=True):
         branch = BRANCH_OF.get((cell or first).casefold())
         if branch is None:
-            raise InputError(Message("log/branch", cell=repr(cell[:40])), path=path, line=line)
+            raise InputError(Message("log/branch", cell=repr(cell[:40])), line=line)
         branches.append(branch)
     return branches
 

@@ -10,7 +10,6 @@ import re
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.intake.columns import Columns
@@ -57,14 +56,14 @@ class Table:
         return (cell for cells in rows for place, cell in enumerate(cells) if place not in known)
 
 
-def read_table(rows: Rows, columns: Columns, path: Path) -> Table:
+def read_table(rows: Rows, columns: Columns) -> Table:
     """Split the rows below the header; raises `InputError` ``log/row-length``."""
     table, surplus = _split(rows, columns)
     end = _end_of_samples(table, columns)
     if surplus < end:
         line, cells = rows[table.places[surplus]]
         key = "log/row-length.comma" if columns.separator == "," else "log/row-length"
-        raise InputError(Message(key, cells=len(cells), width=columns.width), path=path, line=line)
+        raise InputError(Message(key, cells=len(cells), width=columns.width), line=line)
     summary = tuple(rows.lines[place] for place in table.places[end:])
     if not summary:
         return table

@@ -32,34 +32,34 @@ def spent(work, *arguments):
     return min(taken)
 
 
-def read(text, path):
-    columns, rows = find_columns(HEAD + text, LogSpec(), path=path)
-    return read_table(rows, columns, path)
+def read(text):
+    columns, rows = find_columns(HEAD + text, LogSpec())
+    return read_table(rows, columns)
 
 
-def test_summary_rows_are_looked_for_once(tmp_path):
+def test_summary_rows_are_looked_for_once():
     def rows(count):
         return "0,loading,1,2,3,\n" * count
 
-    assert spent(read, rows(60_000), tmp_path) < FOUR * spent(read, rows(15_000), tmp_path)
+    assert spent(read, rows(60_000)) < FOUR * spent(read, rows(15_000))
 
 
-def test_rows_of_means_below_a_table_are_told_from_those_within(tmp_path):
+def test_rows_of_means_below_a_table_are_told_from_those_within():
     sample, mean, remark = "0,loading,1,2,3,\n", "mean,,,1,2,\n", ",,,,x,\n"
-    table = read(sample + mean + sample + sample + remark + mean + mean, tmp_path)
+    table = read(sample + mean + sample + sample + remark + mean + mean)
     assert list(table.lines) == [2, 3, 4, 5]
     assert table.summary == (6, 7, 8)
     assert table.cells["force"] == ["3", "2", "3", "3"]
-    nothing_else = read(mean + mean, tmp_path)  # refused cell by cell
+    nothing_else = read(mean + mean)  # refused cell by cell
     assert list(nothing_else.lines) == [2, 3] and nothing_else.summary == ()
 
 
-def test_of_a_long_log_no_cell_is_kept_that_has_no_role_or_is_that_above(tmp_path):
+def test_of_a_long_log_no_cell_is_kept_that_has_no_role_or_is_that_above():
     """A million rows took 760 MB, now 360: each of their six cells was a text of its own, and so were their lines."""
     text = "".join(f"{k // 5000},loading,{k},{k // 5000},{k % 977},,remark {k}\n" for k in range(20_000))
-    columns, rows = find_columns(HEAD.replace("\n", ",notes\n") + text, LogSpec(), path=tmp_path)
+    columns, rows = find_columns(HEAD.replace("\n", ",notes\n") + text, LogSpec())
     tracemalloc.start()
-    table = read_table(rows, columns, tmp_path)
+    table = read_table(rows, columns)
     kept = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
     # times and forces of 54 bytes; eight of a pointer for six cells and the place of a row, lists an eighth longer
@@ -69,20 +69,20 @@ def test_of_a_long_log_no_cell_is_kept_that_has_no_role_or_is_that_above(tmp_pat
 
 
 @pytest.mark.parametrize("cell", ["[", "(", "( ", "[(", "/ ", "in ", "a[", "_", "_ "])
-def test_a_header_of_brackets_takes_time_in_proportion(cell, tmp_path):
+def test_a_header_of_brackets_takes_time_in_proportion(cell):
     def read(count):
         text = f"force_N;displacement_mm;{cell * count}x\n1;2;3\n"
-        find_columns(text, LogSpec(), path=tmp_path)
+        find_columns(text, LogSpec())
 
     assert spent(read, 16_000) < FOUR * spent(read, 4_000)
 
 
-def test_a_line_of_separators_alone_is_no_table_of_a_million_columns(tmp_path):
+def test_a_line_of_separators_alone_is_no_table_of_a_million_columns():
     def read(count):
-        find_columns("a," * count + "\n" + HEAD + "0,loading,0,0,0,\n", LogSpec(), path=tmp_path)
+        find_columns("a," * count + "\n" + HEAD + "0,loading,0,0,0,\n", LogSpec())
 
     assert spent(read, 40_000) < FOUR * spent(read, 10_000)
-    columns, rows = find_columns("a," * 10**5 + "\n" + HEAD, LogSpec(), path=tmp_path)
+    columns, rows = find_columns("a," * 10**5 + "\n" + HEAD, LogSpec())
     assert columns.header_line == 2
     assert len(rows[0][1]) == 1001
     assert [len(row) for _, row in rows] == [1001, 6]
@@ -123,7 +123,7 @@ def test_wild_forces_within_wild_forces_end(tmp_path):
     assert sum(finding.code == "log/wild-force" for finding in log.findings) == 10
 
 
-def test_a_complaint_about_a_long_header_is_short(tmp_path):
+def test_a_complaint_about_a_long_header_is_short():
     with pytest.raises(InputError) as refused:
-        find_columns("step," + "[" * 16_000 + "\n1,2\n", LogSpec(), path=tmp_path)
+        find_columns("step," + "[" * 16_000 + "\n1,2\n", LogSpec())
     assert len(str(refused.value.said)) < 500
