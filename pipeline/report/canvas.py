@@ -165,6 +165,12 @@ def plot_area(
     )
 
 
+def noise_band(axes: Axes) -> None:
+    """Shade where a residual in standard deviations is called noise, about a line of zero."""
+    axes.axhspan(-NOISE, NOISE, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
+    axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
+
+
 def label_width(labels: Iterable[str], *, most: float) -> float:
     """Room in px that labels of an axis need, at most so much: names differ in length from language to language."""
     return min(most, float(STYLE["font.size"]) * max(map(text_width, labels), default=0.0) + LABEL_GAP)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from pipeline.report.canvas import DASHES, LIGHT, NOISE, ONE_ROW, Area, finish, plot_area, step_colours
+from pipeline.report.canvas import DASHES, LIGHT, NOISE, ONE_ROW, Area, finish, noise_band, plot_area, step_colours
 from pipeline.report.maps import extended_map
 from pipeline.report.ruling import Ruling
 from pipeline.report.words import Words
@@ -207,26 +207,37 @@ def draw_forces(figure: Area, result: Result, words: Words) -> Axes:
     """Draw measured and simulated force over the displacement, and what is left between them in sigma."""
     height, unit, given = figure.bbox.height, force_unit(result, words), steps_of_answer(result)
     fitted = [step for step in given if step.force_fit_N is not None]
+    by_branch = {branch: [step for step in given if step.branch == branch] for branch in MARKERS}
     axes = plot_area(figure, bottom=0.38 * height) if fitted else plot_area(figure)
-    for branch in MARKERS:
-        steps = [step for step in given if step.branch == branch]
+    for branch, steps in by_branch.items():
         if steps:
-            _branch(axes, branch, steps, unit, words)
+            axes.errorbar(
+                [1e3 * step.displacement_m for step in steps],
+                [unit.factor * step.force_N for step in steps],
+                yerr=[unit.factor * words.half_band * step.force_std_N for step in steps],
+                capsize=3.0,
+                elinewidth=1.2,
+                label=words.known(f"branch_{branch}", branch),
+                **_marks(branch),
+            )
     under = Ruling(labelled=False) if fitted else Ruling(words("axis_displacement"))
     if fitted:
         role = "extended" if result.answer.method == "extended" else "inverse"
         _simulated(axes, fitted, unit, LIGHT[role], words)
         rest = plot_area(figure, top=0.68 * height)
         rest.set_xlim(axes.get_xlim())
-        _force_rest(rest, given, words)
+        _force_rest(rest, by_branch, words)
     finish(axes, words, x=under, y=words("axis_force", unit=unit.symbol), legend=2)
     return axes
 
 
 def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, colour: str, words: Words) -> None:
-    """Simulated forces, loading and unloading."""
-    for branch in ("loading", "unloading"):
-        line = _line_of_branch(fitted, branch)
+    """Simulated forces: a line of loading, and one of unloading that starts where loading ended."""
+    ordered = sorted(fitted, key=lambda step: step.displacement_m)
+    loading = [step for step in ordered if step.branch != "unloading"]
+    turning = loading[-1:] if len(loading) < len(ordered) else []
+    unloading = [step for step in ordered if step.branch == "unloading" or step in turning]
+    for line, dash, label in ((loading, "-", words("simulated")), (unloading, (0, (4, 2)), None)):
         axes.plot(
             [1e3 * step.displacement_m for step in line],
             [unit.factor * (step.force_fit_N or 0.0) for step in line],
@@ -235,23 +246,21 @@ def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, colour: str, word
             ms=14.0,
             mew=2.0,
             lw=0.8,
-            ls="-" if branch == "loading" else (0, (4, 2)),
-            label=words("simulated") if branch == "loading" else None,
+            ls=dash,
+            label=label,
         )
 
 
-def _force_rest(rest: Axes, given: list[StepPart], words: Words) -> None:
+def _force_rest(rest: Axes, by_branch: dict[str, list[StepPart]], words: Words) -> None:
     """Measured minus simulated force in standard deviations."""
-    for branch in MARKERS:
-        steps = [step for step in given if step.branch == branch]
-        left = [(1e3 * step.displacement_m, force_residual(step)) for step in steps]
-        rest.plot([d for d, r in left if r is not None], [r for _, r in left if r is not None], **_marks(branch))
-    rest.axhspan(-NOISE, NOISE, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
-    rest.axhline(0.0, color=LIGHT["muted"], lw=0.8)
-    limit = max([1.5 * NOISE, *(1.15 * abs(force_residual(step) or 0.0) for step in given)])
+    limit = 1.5 * NOISE
+    for branch, steps in by_branch.items():
+        left = [(1e3 * step.displacement_m, sigma) for step in steps if (sigma := force_residual(step)) is not None]
+        rest.plot([d for d, _ in left], [sigma for _, sigma in left], **_marks(branch))
+        limit = max(limit, *(1.15 * abs(sigma) for _, sigma in left), 0.0)
+    noise_band(rest)
     rest.set_ylim(-limit, limit)
-    sigma = Ruling(words("axis_sigma"), most=4, whole=True)
-    finish(rest, words, x=words("axis_displacement"), y=sigma)
+    finish(rest, words, x=words("axis_displacement"), y=Ruling(words("axis_sigma"), most=4, whole=True))
 
 
 def _marks(branch: str) -> dict[str, Any]:
@@ -263,29 +272,6 @@ def _marks(branch: str) -> dict[str, Any]:
         "color": LIGHT["measured"],
         "mfc": LIGHT["paper"] if branch == "unloading" else LIGHT["measured"],
     }
-
-
-def _branch(axes: Axes, branch: str, steps: list[StepPart], unit: Unit, words: Words) -> None:
-    """Measured forces of one branch with error bars."""
-    axes.errorbar(
-        [1e3 * step.displacement_m for step in steps],
-        [unit.factor * step.force_N for step in steps],
-        yerr=[unit.factor * words.half_band * step.force_std_N for step in steps],
-        capsize=3.0,
-        elinewidth=1.2,
-        label=words.known(f"branch_{branch}", branch),
-        **_marks(branch),
-    )
-
-
-def _line_of_branch(steps: list[StepPart], branch: str) -> list[StepPart]:
-    """The simulated steps of one branch; unloading starts where loading ended."""
-    loading = [step for step in steps if step.branch != "unloading"]
-    if branch == "loading":
-        return sorted(loading, key=lambda step: step.displacement_m)
-    unloading = [step for step in steps if step.branch == "unloading"]
-    turning = max(loading, key=lambda step: step.displacement_m, default=None)
-    return sorted([*unloading, *([turning] if turning and unloading else [])], key=lambda step: step.displacement_m)
 
 
 def force_residual(step: StepPart) -> float | None:

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
 
 from pipeline.records import Array
-from pipeline.report.canvas import LIGHT, NOISE, ONE_ROW, Area, finish, label_width, plot_area
+from pipeline.report.canvas import LIGHT, ONE_ROW, Area, finish, label_width, noise_band, plot_area
 from pipeline.report.ruling import Ruling, rule
 from pipeline.report.words import Words
 from pipeline.result import PhotoPart, ResidualMap, Result
@@ -122,8 +122,7 @@ def draw_map(figure: Area, residuals: ResidualMap, words: Words, *, title: str =
 def draw_force_rest(figure: Area, before: ResidualMap, after: ResidualMap, words: Words) -> Axes:
     """Draw forces left over by step in sigma, before and after the extension."""
     axes = plot_area(figure, top=ONE_ROW)
-    axes.axhspan(-NOISE, NOISE, color=LIGHT["unvisited"], alpha=0.16, lw=0.0)
-    axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
+    noise_band(axes)
     for residuals, role, marker, label in ((before, "alarm", "x", "before"), (after, "extended", "o", "after")):
         if residuals.force_sigma:
             values = _numbers(residuals.force_sigma)
