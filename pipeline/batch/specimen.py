@@ -12,7 +12,7 @@ import json
 import time
 import traceback
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -81,8 +81,8 @@ class Outcome:
     name: str
     status: Literal["measured", "partial", "failed"]
     headline: str
-    reused: bool
-    seconds: float
+    reused: bool = False
+    seconds: float = 0.0
     entry: dict[str, Any] | None = None
     usable: bool = True
     said: Message | None = None
@@ -107,18 +107,19 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True, doing: 
     """
     started, store, timeout_s = time.monotonic(), Store(order.out), order.settings.batch.timeout_s
     try:
-        if not guarded:
-            return _measured(store, order, stages, started, doing)
-        refused = _earlier_attempts(store, order, timeout_s)
+        refused = _earlier_attempts(store, order, timeout_s) if guarded else None
         if refused is not None:
-            return store_failure(order, [refused], started)
-        with deadline(timeout_s, store.overdue(order.name).touch):
-            outcome = _measured(store, order, stages, started, doing)
-        store.end(order.name)
-        return outcome
+            outcome = store_failure(order, [refused])
+        elif guarded:
+            with deadline(timeout_s, store.overdue(order.name).touch):
+                outcome = _measured(store, order, stages, doing)
+            store.end(order.name)
+        else:
+            outcome = _measured(store, order, stages, doing)
     except Exception as error:  # the one place: whatever breaks on a specimen is its finding and never costs the batch
         trace = None if isinstance(error, InputError) else traceback.format_exc()
-        return store_failure(order, refusals(error), started, trace=trace)
+        outcome = store_failure(order, refusals(error), trace=trace)
+    return replace(outcome, seconds=time.monotonic() - started)
 
 
 def refusals(error: Exception) -> list[FindingPart]:
@@ -149,7 +150,7 @@ def overdue(timeout_s: float) -> FindingPart:
     return FindingPart.of("error", Message("specimen/timeout", seconds=timeout_s))
 
 
-def _measured(store: Store, order: Order, stages: Stages, started: float, doing: Doing) -> Outcome:
+def _measured(store: Store, order: Order, stages: Stages, doing: Doing) -> Outcome:
     """Read, compare with what is stored, measure, store."""
     one_thread()  # for workers that were started by others
     keep_memory()
@@ -161,9 +162,8 @@ def _measured(store: Store, order: Order, stages: Stages, started: float, doing:
         with contextlib.suppress(OSError, ValueError, InputError):  # a stored result that is none is measured anew
             if order.settings.batch.reports and stored.get("reports") != order.settings.report.language:
                 draw_again(store, order.name, read_result(store.out / order.name), stages, order.settings)
-            told = str(stored.get("headline", ""))
-            usable = stored.get("state") != "unusable"
-            return Outcome(order.name, stored["status"], told, True, time.monotonic() - started, usable=usable)
+            told, usable = str(stored.get("headline", "")), stored.get("state") != "unusable"
+            return Outcome(order.name, stored["status"], told, reused=True, usable=usable)
     own = {"on_stage": doing} if stages.measure is _pipeline_measure else {}  # of a notebook it takes no such thing
     result = stages.measure(order.folder, order.settings, command=order.command, **own)
     entry = _entry(order, result, mark)
@@ -172,28 +172,21 @@ def _measured(store: Store, order: Order, stages: Stages, started: float, doing:
         stages.write(result, staged, order.settings)
         write_entry(entry, staged)
         store.install(staged, order.name)
-    usable, took = entry["state"] != "unusable", time.monotonic() - started
-    return Outcome(order.name, result.status, entry["headline"], False, took, usable=usable)
-
-
-def _language_drawn(settings: Settings) -> str:
-    """Language of the reports that are drawn; empty where none are."""
-    return settings.report.language if settings.batch.reports else ""
+    return Outcome(order.name, result.status, entry["headline"], usable=entry["state"] != "unusable")
 
 
 def draw_again(store: Store, name: str, result: Result, stages: Stages, settings: Settings) -> None:
     """Write tables and reports of a stored result again, without measuring."""
     with store.staging() as staged:
         stages.write(result, staged, settings)
-        told = {"reports": _language_drawn(settings), **_in_index(result)}
-        write_entry((store.entry(name) or {}) | told, staged)
+        write_entry((store.entry(name) or {}) | _drawn(result, settings), staged)
         store.install(staged, name)
 
 
-def _in_index(result: Result) -> dict[str, Any]:
-    """What the index and the next run read in place of a result."""
-    row = index_row(result)
-    return {"state": row.state, "row": as_entry(row)}
+def _drawn(result: Result, settings: Settings) -> dict[str, Any]:
+    """What the index reads in place of a result, and the language of the reports; empty where none are drawn."""
+    row, language = index_row(result), settings.report.language if settings.batch.reports else ""
+    return {"state": row.state, "row": as_entry(row), "reports": language}
 
 
 def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
@@ -207,8 +200,7 @@ def _entry(order: Order, result: Result, mark: str) -> dict[str, Any]:
         "headline": result.headline or (reasons[0].message if reasons else ""),
         "said": _said(result),
         "code": reasons[0].code if reasons else None,
-        "reports": _language_drawn(order.settings),
-        **_in_index(result),
+        **_drawn(result, order.settings),
         "fingerprint": mark,  # empty where the measurement did not come to an end: the next run tries again
     }
 
@@ -222,10 +214,10 @@ def _said(result: Result) -> dict[str, Any]:
     return (result.findings[0].said if result.findings else free_text(result.headline)).stored()
 
 
-def store_failure(order: Order, findings: list[FindingPart], started: float, *, trace: str | None = None) -> Outcome:
+def store_failure(order: Order, findings: list[FindingPart], *, trace: str | None = None) -> Outcome:
     """Store a specimen that could not be measured, with its reason; if even that fails the outcome carries it.
 
-    ``started``: `time.monotonic` at its begin, s; ``trace``: where in the program it failed, for the provenance.
+    ``trace``: where in the program it failed, for the provenance.
     """
     store = Store(order.out)
     result = failed_result(order, findings, trace)
@@ -237,13 +229,16 @@ def store_failure(order: Order, findings: list[FindingPart], started: float, *, 
         store.install(staged, order.name)
         store.end(order.name)
         unstored = None
-    took, said = time.monotonic() - started, findings[0].said
-    return Outcome(order.name, "failed", findings[0].message, False, took, unstored, said=said)
+    return Outcome(order.name, "failed", findings[0].message, entry=unstored, said=findings[0].said)
 
 
 def store_death(order: Order, told: str, started: float) -> Outcome:
-    """Store a specimen whose worker ended without an outcome, as far as its notes tell not by its own fault."""
-    return store_failure(order, [FindingPart.of("error", Message("specimen/worker-died.told", told=told))], started)
+    """Store a specimen whose worker ended without an outcome, as far as its notes tell not by its own fault.
+
+    ``started``: `time.monotonic` at its begin, s.
+    """
+    outcome = store_failure(order, [FindingPart.of("error", Message("specimen/worker-died.told", told=told))])
+    return replace(outcome, seconds=time.monotonic() - started)
 
 
 def failed_result(order: Order, findings: list[FindingPart], trace: str | None = None) -> Result:

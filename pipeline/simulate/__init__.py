@@ -5,21 +5,14 @@
 `pipeline.simulate.effects` says how. All chance comes from the experiment's seed.
 """
 
-from pipeline.simulate.effects import EFFECTS, parse_effect
-from pipeline.simulate.experiment import Experiment, State, bend, protocol
-from pipeline.simulate.photography import Photography
-from pipeline.simulate.specimen import Written, demo_specimen, simulate_specimen, write_specimen
-
-__all__ = [
-    "EFFECTS",
-    "Experiment",
-    "Photography",
-    "State",
-    "Written",
-    "bend",
-    "demo_specimen",
-    "parse_effect",
-    "protocol",
-    "simulate_specimen",
-    "write_specimen",
-]
+from pipeline.simulate.effects import EFFECTS as EFFECTS
+from pipeline.simulate.effects import parse_effect as parse_effect
+from pipeline.simulate.experiment import Experiment as Experiment
+from pipeline.simulate.experiment import State as State
+from pipeline.simulate.experiment import bend as bend
+from pipeline.simulate.experiment import protocol as protocol
+from pipeline.simulate.photography import Photography as Photography
+from pipeline.simulate.specimen import Written as Written
+from pipeline.simulate.specimen import demo_specimen as demo_specimen
+from pipeline.simulate.specimen import simulate_specimen as simulate_specimen
+from pipeline.simulate.specimen import write_specimen as write_specimen

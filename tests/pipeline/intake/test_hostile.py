@@ -21,6 +21,7 @@ from pipeline.intake.tomldepth import too_deep
 from pipeline.settings import Settings
 from pipeline.settings.intake import IntakeSettings
 from tests.pipeline.intake.conftest import TOML
+from tests.pipeline.intake.timing import spent
 
 SETTINGS = IntakeSettings()
 BOARD = "board = {columns = 9, rows = 6, square_mm = 10.0}\n"
@@ -192,16 +193,6 @@ def test_a_photo_of_an_impossible_name_is_a_finding(name, specimen_folder):
 )
 def test_depth_of_a_text(text, line):
     assert too_deep(text, 4) == line
-
-
-def spent(work, *arguments):
-    """Processor time of the quickest of three calls, s."""
-    taken = []
-    for _ in range(3):
-        started = time.process_time()
-        work(*arguments)
-        taken.append(time.process_time() - started)
-    return min(taken)
 
 
 @pytest.mark.parametrize("what", ["bracket in a text", "long key"])

@@ -1,6 +1,5 @@
 """Long and wide force logs take time and memory in proportion to their length."""
 
-import time
 import tracemalloc
 from itertools import pairwise
 
@@ -15,21 +14,12 @@ from pipeline.intake.samples import Samples
 from pipeline.intake.specimenfile import LogSpec
 from pipeline.intake.table import read_table
 from pipeline.settings.intake import IntakeSettings
+from tests.pipeline.intake.timing import spent
 
 SETTINGS = IntakeSettings()
 HEAD = "step,branch,time_s,displacement_mm,force_N,image\n"
 FOUR = 8.0
 """Ratio of the times for four times the work: 4 where it is linear, 16 where it is quadratic; half-way between."""
-
-
-def spent(work, *arguments):
-    """Processor time of the quickest of three calls, s."""
-    taken = []
-    for _ in range(3):
-        started = time.process_time()
-        work(*arguments)
-        taken.append(time.process_time() - started)
-    return min(taken)
 
 
 def read(text):
