@@ -109,3 +109,14 @@ def test_scale_of_forces_does_not_matter():
     # roundings; the first force is one of noise about zero, 1e-5 N
     np.testing.assert_allclose(np.array(other.force), 1e-3 * np.array(one.force), rtol=1e-9)
     np.testing.assert_allclose(np.array(other.std), 1e-3 * np.array(one.std), rtol=1e-9)
+
+
+def test_where_holds_scatter_differently_a_single_sample_has_the_common_error():
+    """It has no variance of its own."""
+    rng = np.random.default_rng(5)
+    many = [Hold(np.arange(20.0), 2.0 + std * rng.standard_normal(20), photo_time=10.0) for std in (0.001, 0.1)]
+    single = Hold(np.zeros(1), np.array([2.0]), photo_time=0.0)
+    found = hold_forces([*many, single], resolution=1e-5, settings=SETTINGS)
+    quiet, loud, alone = found.std
+    assert quiet < 0.5 * loud
+    assert alone == pytest.approx(np.sqrt(np.mean([hold.forces.var(ddof=1) for hold in many])), rel=1e-3)

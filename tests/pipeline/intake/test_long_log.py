@@ -44,6 +44,12 @@ def test_rows_of_means_below_a_table_are_told_from_those_within():
     assert list(nothing_else.lines) == [2, 3] and nothing_else.summary == ()
 
 
+def test_rows_without_a_displacement_of_their_own_are_no_remarks_where_most_are():
+    """A log of one hold that names its displacement once: the other rows carry it down."""
+    table = read("1,loading,1,4.0,2.31,\n1,loading,2,,2.32,\n1,loading,3,,2.33,\n")
+    assert table.cells["force"] == ["2.31", "2.32", "2.33"] and table.summary == ()
+
+
 def test_of_a_long_log_no_cell_is_kept_that_has_no_role_or_is_that_above():
     """A million rows took 760 MB, now 360: each of their six cells was a text of its own, and so were their lines."""
     text = "".join(f"{k // 5000},loading,{k},{k // 5000},{k % 977},,remark {k}\n" for k in range(20_000))
