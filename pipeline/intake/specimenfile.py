@@ -90,14 +90,19 @@ def described(source: TomlFile, folder: Path, settings: IntakeSettings) -> Speci
     hints = wrong.kept(read_hints, source)
     wrong.settle()
     assert camera is not None and hints is not None
-    cable = values["specimen"]
+    cable, rig = values["specimen"], values["rig"]
     return Specimen(
         id=cable.get("id", folder_name(folder)),
         folder=folder,
         length_m=cable["length_mm"],
         diameter_m=cable["diameter_mm"],
         camera=camera,
-        rig=_rig(values["rig"]),
+        rig=RigSpec(
+            moving_bearing=rig.get("moving_bearing", "left"),
+            marker_diameter_m=rig.get("bearing_marker_mm"),
+            bearings_px=rig.get("bearings_px"),
+            force_sign=rig.get("force_sign", "compression"),
+        ),
         steps=(),
         images={},
         description={key: cable[key] for key in DESCRIPTION if key in cable},
@@ -141,15 +146,6 @@ def _camera(source: TomlFile, values: dict[str, Any], folder: Path, settings: In
         calibration=calibration,
         board=values.get("board"),
         distance_m=values.get("distance_mm"),
-    )
-
-
-def _rig(values: dict[str, Any]) -> RigSpec:
-    return RigSpec(
-        moving_bearing=values.get("moving_bearing", "left"),
-        marker_diameter_m=values.get("bearing_marker_mm"),
-        bearings_px=values.get("bearings_px"),
-        force_sign=values.get("force_sign", "compression"),
     )
 
 

@@ -50,13 +50,11 @@ class Photography:
     light, ground, sheath, sensor : records of the renderer
     covers : (Cover or None, Cover or None)
         None shows the cable's ends on the axes.
-    things, others : tuples
+    things : tuple
         What else is in view.
     scale : str
         How the folder tells the scale: a ``number``, a ``board`` photo, the covers (``markers``) or the displacement
         log (``bearings``).
-    board : ChessBoard or None
-        Lying on the table, half a diameter below the axis; placed in the middle of the view. None: made to fit.
     suffix : str
         ``.png``, ``.jpg``, ``.tif`` or ``.bmp``.
     jpeg_quality : int
@@ -75,15 +73,9 @@ class Photography:
     sensor: Sensor = field(default_factory=Sensor)
     covers: tuple[Cover | None, Cover | None] = field(default_factory=lambda: (Cover(), Cover()))
     things: tuple[Thing, ...] = ()
-    others: tuple[Strand, ...] = ()
     scale: ScaleSource = "number"
-    board: ChessBoard | None = None
     suffix: str = ".png"
     jpeg_quality: int = 92
-
-    def __post_init__(self) -> None:
-        if self.scale == "markers" and None in self.covers:
-            raise ValueError("a scale from markers needs covers on both axes")
 
     def camera(self, experiment: Experiment, states: tuple[State, ...]) -> Camera:
         """Camera that sees all steps, without hidden lens or tilt."""
@@ -111,24 +103,22 @@ class Photography:
             covers=self.covers,
             light=self.light,
             ground=self.ground,
-            others=self.others,
             things=self.things,
             sensor=self.sensor,
             seed=seed,
             ground_seed=experiment.seed,
         )
 
-    def fitted_board(self, experiment: Experiment, camera: Camera) -> ChessBoard:
-        """The board of the calibration photo."""
-        if self.board is not None:
-            return self.board
-        square = 0.085 * min(camera.width, camera.height) / camera.px_per_m
-        along = int(0.9 * max(camera.width, camera.height) / camera.px_per_m / square) - 3
-        turn = camera.roll_rad if camera.width >= camera.height else camera.roll_rad - np.pi / 2
-        turn = turn if camera.mirrored else -turn
-        rows = 7 if along != 7 else 6  # different counts tell the board's directions apart
-        low = -0.5 * experiment.diameter_m
-        return ChessBoard(along, rows, square, camera.look_at_m, (0.0, 0.0, turn), low)
+
+def fitted_board(experiment: Experiment, camera: Camera) -> ChessBoard:
+    """The board of the calibration photo, on the table, half a diameter below the axis, as large as the view takes."""
+    square = 0.085 * min(camera.width, camera.height) / camera.px_per_m
+    along = int(0.9 * max(camera.width, camera.height) / camera.px_per_m / square) - 3
+    turn = camera.roll_rad if camera.width >= camera.height else camera.roll_rad - np.pi / 2
+    turn = turn if camera.mirrored else -turn
+    rows = 7 if along != 7 else 6  # different counts tell the board's directions apart
+    low = -0.5 * experiment.diameter_m
+    return ChessBoard(along, rows, square, camera.look_at_m, (0.0, 0.0, turn), low)
 
 
 def _seen(state: State, lean: float) -> Curve:

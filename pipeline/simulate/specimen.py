@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.messages import Message
 from pipeline.simulate.effects import Readings, Setup
 from pipeline.simulate.experiment import Experiment, State, bend, protocol
-from pipeline.simulate.photography import Photography
+from pipeline.simulate.photography import Photography, fitted_board
 from pipeline.vision.render import Camera, Picture, render, render_board
 from pipeline.vision.render.sensor import write_picture
 
@@ -147,7 +147,7 @@ def _lean(setup: Setup, states: tuple[State, ...]) -> float:
 def _calibrate(folder: Path, experiment: Experiment, photography: Photography, camera: Camera, state: State) -> None:
     (folder / "calibration").mkdir(exist_ok=True)
     scene = photography.scene(experiment, state, camera, 10_000)  # a seed no step has
-    pixels = render_board(scene, photography.fitted_board(experiment, camera))
+    pixels = render_board(scene, fitted_board(experiment, camera))
     path = folder / "calibration" / f"board{photography.suffix}"
     write_picture(path, pixels, jpeg_quality=photography.jpeg_quality)
 
@@ -188,7 +188,7 @@ def _description(experiment: Experiment, setup: Setup, photography: Photography,
     if photography.scale == "number":
         lines.append(f"scale_px_per_mm = {1e-3 * setup.camera.px_per_m * (1.0 + setup.readings.scale):.6f}")
     elif photography.scale == "board":
-        board = photography.fitted_board(experiment, setup.camera)
+        board = fitted_board(experiment, setup.camera)
         square = 1e3 * board.square_m / (1.0 + setup.readings.scale)
         lines.append('calibration = "calibration"')
         lines.append(f"board = {{columns = {board.columns}, rows = {board.rows}, square_mm = {square:.6f}}}")

@@ -89,3 +89,26 @@ def read_with(document, form):
 def test_a_result_from_before_there_were_answers_has_one(document):
     earlier = from_json(json.dumps({name: value for name, value in document.items() if name != "answer"}))
     assert earlier.answer.method == "extended" and earlier.answer.usable
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"kappa_per_m": lambda kappa: kappa[::-1]}, "does not increase"),
+        ({"tangent_factor_Nm2": lambda factor: [*factor[:-1], factor[-1][:-1]]}, "rows of different lengths"),
+        ({"pre_curvature_factor_per_m": lambda rest: [*rest, 0.0]}, "has not the length of the rows"),
+        ({"moment_Nm": lambda moment: moment[:-1]}, "lists of different lengths"),
+    ],
+    ids=lambda value: "" if isinstance(value, str) else next(iter(value)),
+)
+def test_a_curve_whose_parts_do_not_fit_is_refused(document, changes, told):
+    curve = document["inverse"]["curve"]
+    columns = {
+        "tangent_factor_Nm2": [[1e-4, 0.0]] * len(curve["kappa_per_m"]),
+        "pre_curvature_factor_per_m": [0.1, 0.2],
+    }
+    whole = {**curve, **columns}
+    from_json(json.dumps({**document, "inverse": {**document["inverse"], "curve": whole}}))
+    damaged = {**whole, **{name: change(whole[name]) for name, change in changes.items()}}
+    with pytest.raises(ValueError, match=told):
+        from_json(json.dumps({**document, "inverse": {**document["inverse"], "curve": damaged}}))
