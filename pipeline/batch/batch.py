@@ -182,9 +182,9 @@ def measure_all(
     orders: Sequence[Order],
     settings: BatchSettings,
     *,
-    scheduler: str | None = None,
+    scheduler: str | None,
     stages: Stages,
-    doing: Callable[[str, str], None] = lambda name, stage: None,
+    doing: Callable[[str, str], None],
 ) -> Generator[Outcome]:
     """Measure all orders; outcomes in the order in which they end.
 

@@ -42,7 +42,7 @@ class Order:
     command: str
 
 
-def make_orders(folders: Sequence[Path], out: Path, settings: Settings, *, options: str = "") -> list[Order]:
+def make_orders(folders: Sequence[Path], out: Path, settings: Settings, *, options: str) -> list[Order]:
     """Orders for a batch, in the order of the folders.
 
     The command in a result names the specimen from anywhere, and no folder of results: the same bytes go into any.

@@ -241,7 +241,7 @@ def store_death(order: Order, told: str, started: float) -> Outcome:
     return replace(outcome, seconds=time.monotonic() - started)
 
 
-def failed_result(order: Order, findings: list[FindingPart], trace: str | None = None) -> Result:
+def failed_result(order: Order, findings: list[FindingPart], trace: str | None) -> Result:
     """The result of a specimen that could not be measured."""
     provenance = {"command": order.command, "version": order.version}
     return Result(

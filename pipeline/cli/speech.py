@@ -66,14 +66,11 @@ def entry(begin: str, text: str) -> str:
     return begin + "\n".join(lines)[len(plain) :]
 
 
-def table(rows: Sequence[Sequence[str]], *, left: int = 1) -> list[str]:
-    """Rows of cells as lines, the first row above a rule; all columns but the first ``left`` ones are set right."""
+def table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells as lines, the first row above a rule; all columns but the first one are set right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        "  ".join(
-            f"{cell:<{width}}" if place < left else f"{cell:>{width}}"
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+    lines = []
+    for first, *others in rows:
+        right = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
+        lines.append("  ".join((f"{first:<{widths[0]}}", *right)).rstrip())
     return [lines[0], "-" * (sum(widths) + 2 * (len(widths) - 1)), *lines[1:]]

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import codecs
 import csv
-import math
 import re
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Literal
 
 from pipeline.errors import InputError
@@ -168,29 +168,27 @@ def is_missing(cell: str) -> bool:
 
 
 def decimal_sign(
-    tokens: Iterable[str],
+    forces: Sequence[str],
+    travels: Sequence[str],
+    others: Callable[[], Iterable[str]],
     *,
     separator: str,
-    decimal: Decimal | None = None,
-    others: Callable[[], Iterable[str]] = tuple,
-    travels: Iterable[str] = (),
-    farthest: float = math.inf,
+    decimal: Decimal | None,
+    farthest: float,
 ) -> Decimal:
     """The decimal sign of a file from all its number cells.
 
     Parameters
     ----------
-    tokens : iterable of str
+    forces, travels : sequence of str
         Forces and displacements.
-    decimal : "." or ",", optional
-        What the user says; it wins.
     others : callable
         Gives the remaining cells of the table. They are asked only where every force and displacement can be read both
         ways, and believed only where they agree.
-    travels : iterable of str
-        Displacements; asked last. Those that would lie farther apart than ``farthest`` as thousands are fractions.
+    decimal : "." or ",", or None
+        What the user says; it wins.
     farthest : float
-        In the unit of the log.
+        In the unit of the log. Asked last: displacements that as thousands would lie farther apart are fractions.
 
     Raises
     ------
@@ -199,7 +197,7 @@ def decimal_sign(
     """
     if decimal is not None:
         return decimal
-    marked = [token for token in tokens if ("." in token or "," in token) and not is_missing(token)]
+    marked = [token for token in chain(forces, travels) if ("." in token or "," in token) and not is_missing(token)]
     if not marked or (separator == "," and not any("," in token for token in marked)):
         return "."
     point = comma = 0  # cells that are no number with a decimal point, with a decimal comma

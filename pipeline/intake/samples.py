@@ -10,7 +10,6 @@ import bisect
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 
@@ -110,11 +109,11 @@ def read_samples(rows: Rows, columns: Columns, spec: LogSpec, *, length: float) 
     # columns that do not decide on the decimal sign: forces and displacements have, and step 1.2 is no number
     told = {columns.index[role] for role in ("force", "displacement", "step", "image") if role in columns.index}
     decimal = decimal_sign(
-        chain(force, displacement),
+        force,
+        displacement,
+        lambda: read.others(told),
         separator=columns.separator,
         decimal=spec.decimal,
-        others=lambda: read.others(told),
-        travels=displacement,
         farthest=length / columns.units["displacement"].factor,
     )
     numbers = _Numbers(decimal, columns, lines)

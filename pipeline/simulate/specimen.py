@@ -37,13 +37,12 @@ class Written:
 
 def simulate_specimen(
     folder: Path,
-    experiment: Experiment | None = None,
+    experiment: Experiment,
     *,
     photography: Photography | None = None,
     truth_file: Path | None = None,
 ) -> Written:
     """Bend, photograph and log a cable; see `write_specimen`."""
-    experiment = experiment or Experiment(id=folder.name)
     return write_specimen(folder, experiment, states=bend(experiment), photography=photography, truth_file=truth_file)
 
 
