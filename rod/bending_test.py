@@ -79,6 +79,8 @@ class BendingTest:
         How fast that growth falls with the bend (see `rod.section`).
     grown : (steps, elements + 1) 1/m or None
         Growth of K0 at the joints that is given step by step; the last one stays.
+    slid : tuple of m
+        Cable that has slid out from between the axes at each step; as much as at the last one from then on.
     zero : "natural", "loaded", "length" or m
         Distance of the axes at displacement zero.
     displacement_offset : m
@@ -105,6 +107,7 @@ class BendingTest:
     set_threshold: float = 0.0
     set_saturation: float = 0.0
     grown: Array | None = None
+    slid: tuple[float, ...] = ()
     zero: Zero | float = "natural"
     displacement_offset: float = 0.0
     elements: int | Array = 100
@@ -137,15 +140,18 @@ class BendingTest:
         )
 
     def rod_at(self, step: int) -> Rod:
-        """The rod of a step, where the bearings differ from step to step."""
+        """The rod of a step, where bearings or length differ from step to step."""
+        rod = self.rod
+        if self.slid:
+            rod = replace(rod, length=self.length - self.slid[min(step, len(self.slid) - 1)])
         if self.friction_by_step is None:
-            return self.rod
+            return rod
         more = self.friction_by_step[min(step, len(self.friction_by_step) - 1)]
         left, right = (
             replace(end, friction_moment=max(end.friction_moment + float(by), 0.0))
             for end, by in zip((self.left, self.right), more, strict=True)
         )
-        return replace(self.rod, left=left, right=right)
+        return replace(rod, left=left, right=right)
 
     @cached_property
     def free(self) -> Equilibrium:
@@ -167,7 +173,7 @@ class BendingTest:
         left, right, friction = self.left, self.right, self.friction
         ends = left.kind, right.kind, left.angle is None, right.angle is None
         rubbing = () if friction is None else (friction.stick.size, *friction.smooth)
-        given = self.grown is None, self.friction_by_step is None, rubbing
+        given = self.grown is None, self.friction_by_step is None, self.slid, rubbing
         elements = tuple(np.atleast_1d(self.elements).tolist())
         return *ends, *given, elements, self.law_stays, self.axial_stiffness, self.shear_stiffness, self.zero
 

@@ -1,10 +1,11 @@
 """What acts on the cable and is no cause of the catalogue: it rolled, a strand broke, something touches it.
 
-Two things may begin between two holds, and stay as they are or grow from hold to hold; each hold but the first is a
+Three things may begin between two holds, and stay as they are or grow from hold to hold; each hold but the first is a
 form of its own:
 
 pre-curvature   K0 is another one from a hold on: the cable rolled about its axis, or was laid in anew
 stiffness       all moments are multiplied by another factor from a hold on: a heater was switched on, a strand broke
+length          less of the cable lies between the axes from a hold on: it slid through a bearing
 
 And forces may act that no model has, with moments that come and go over the steps, from the first or a later one
 on, as cosines of order o, normal about nothing, of a standard deviation that falls with 1 / (1 + o):
@@ -16,7 +17,7 @@ moments         at one bearing or both (a stop, a cable that is led in), falling
 A moment M at a place bends the cable there as a rest that is moved by M / f_EI does: force and shape are the same. So
 they are told as that curvature, 1/m.
 
-Neither has a name in the catalogue, so what it explains is something else; but f_EI beside it can be told, and where
+None has a name in the catalogue, so what it explains is something else; but f_EI beside it can be told, and where
 and when it acts.
 """
 
@@ -94,6 +95,22 @@ class OtherStiffness(_Begun):
         """Multiply the forces by ``1 + amount`` from the step ``at`` on."""
         factor = 1.0 + amount * self.course(variant, facts)
         return model.observed(multiplied(factor, factor[:, None]))
+
+
+class OtherLength(_Begun):
+    """Less cable between the axes from a hold on."""
+
+    name = "begun.length"
+    unit = "m"
+
+    def plausible(self, facts: Facts) -> float:
+        """Two thousandths of the length."""
+        return 2e-3 * facts.length
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Let ``amount`` slide out from the step ``at`` on."""
+        slid = (amount * self.course(variant, facts)).tolist()
+        return replace(model, bending=replace(model.bending, slid=tuple(slid)))
 
 
 class OtherMoments(Cause):
@@ -181,6 +198,6 @@ def _with_rest(model: Model, by_step: Array, form: Callable[[Array], Array]) -> 
     return replace(model, bending=replace(model.bending, grown=more if given is None else given + more))
 
 
-BEGUN = (OtherRest(), OtherStiffness())
+BEGUN = (OtherRest(), OtherStiffness(), OtherLength())
 MOMENTS = OtherMoments()
-UNNAMED: tuple[OtherRest | OtherStiffness | OtherMoments, ...] = (*BEGUN, MOMENTS)
+UNNAMED: tuple[_Begun | OtherMoments, ...] = (*BEGUN, MOMENTS)

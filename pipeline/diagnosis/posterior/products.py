@@ -15,15 +15,17 @@ from pipeline.diagnosis.fits.workbench import SCATTER
 
 Array = NDArray[np.float64]
 
-AS_RIGS_ARE, WORSE = (0.0, 1.0), 3.0
+AS_RIGS_ARE, WORSE, EXACT = (0.0, 1.0), 3.0, 0.1
 MOVED = {
-    (0.0, 0.0): 0.1, AS_RIGS_ARE: 0.45, (0.0, WORSE): 0.1, (SCATTER, 1.0): 0.15, (SCATTER, WORSE): 0.1,
-    (5.0 * SCATTER, WORSE): 0.1,
-}  # fmt: skip
-"""Scatter of the displacements (m), and how far the rig is off, in its standard deviations, all of it together: exact,
-as rigs are, or one of the worse; with probabilities beforehand. One that is exact in all but one thing is rarer than
-one that nobody aligned, and where displacements scatter nobody knows their zero better. An exact one is a simulation;
-where no photo at rest tells the zero, it is this number that decides how well K0 is known."""
+    (scatter, rig): chance * share
+    for scatter, chance in ((0.0, 0.6), (SCATTER, 0.2), (5.0 * SCATTER, 0.2))
+    for rig, share in ((1.0, 0.75), (WORSE, 0.25))
+}
+MOVED |= {AS_RIGS_ARE: MOVED[AS_RIGS_ARE] - EXACT, (0.0, 0.0): EXACT}
+"""Scatter of the displacements (m), and how far the rig is off, in its standard deviations, all of it together: as rigs
+are, or one of the worse; with probabilities beforehand. One that is exact in all but one thing is rarer than one that
+nobody aligned. One exact in all is a simulation; where no photo at rest tells the zero, it is this number that decides
+how well K0 is known."""
 
 ASTRAY, ITS_SHARE = (20.0 * SCATTER, 100.0 * SCATTER), 0.25
 """Scatter of displacements, m, that no log has, and its probability among the four kinds of something else."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.load_cell import Relaxation, lost_unseen
+from pipeline.diagnosis.causes.unnamed import BEGUN
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.heldout import measured_gain
@@ -36,7 +37,7 @@ from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.fit import Fit
 
-BY_CHANCE = ("left.astray", "begun.rest", "begun.stiffness")
+BY_CHANCE = ("left.astray", *(cause.name for cause in BEGUN))
 """What is left over that may have come by chance, and need not come again."""
 
 

@@ -16,6 +16,8 @@ from fixtures.hidden import Reading, hidden_test
 from fixtures.trials import f_error
 from tests.pipeline.diagnosis.among import among
 
+RIVALS_OF_A_SLIDE = "out_of_plane_bow stiffness_drift plastic_set displacement_offset length_error camera_tilt"
+
 
 def changed(before, after, protocol, first, *, seed):
     """A test in which the cable is another one from a step on, the chords as they would have been."""
@@ -57,6 +59,19 @@ def test_a_cable_that_becomes_stiffer_all_at_once(seed, rivals):
     assert part.verdict == "unexplained" and part.leftover.key == "begun.stiffness", part.headline
     size, std, _ = part.leftover.values["size"]
     assert size == pytest.approx(0.025, abs=4.0 * std) and part.leftover.values["step"] == test.steps[4].step
+
+
+@pytest.mark.parametrize(("protocol", "seed", "rivals"), [("six", 87, ""), ("loop", 88, RIVALS_OF_A_SLIDE)])
+def test_a_cable_that_slides_through_a_bearing(protocol, seed, rivals):
+    """It is shorter between the axes from then on, on every photo. It was taken for a bow out of the plane."""
+    cable = Cable()
+    test = changed(cable, replace(cable, length=cable.length - 2.5e-4), protocol, 4, seed=seed)
+    part, _, _ = among(test, rivals)
+    assert part.verdict == "unexplained" and part.leftover.key == "begun.length", part.headline
+    size, std, _ = part.leftover.values["size"]
+    assert size == pytest.approx(2.5e-4, abs=4.0 * std) and std < 1e-4
+    assert part.leftover.values["step"] == test.steps[4].step
+    assert f_error(part.extended, cable)[0] < 0.02
 
 
 @pytest.mark.parametrize(("protocol", "pad", "seed"), [("loop", 0.012, 85), ("six", 0.006, 86)])
