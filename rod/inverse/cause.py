@@ -37,6 +37,8 @@ class Variant:
         Whether ``at``, a time, is known by its order of magnitude: what a refit changes is its logarithm.
     setting : str
         What all forms of the cause that act together have in common, such as where the displacement is counted from.
+    component : bool
+        Whether the forms of a setting are components of one thing: the model has all of them, or one alone.
     trace : float
         Multiple of the usual amount (`search.direction`) at which its trace in the data is computed: one that grows
         otherwise than in proportion looks elsewhere when it is large.
@@ -59,21 +61,12 @@ class Variant:
     width_range: tuple[float, float] = (0.0, 1.0)
     by_factors: bool = False
     setting: str = ""
+    component: bool = False
     trace: float = 1.0
     power: float = 1.0
     known: float = np.inf
     of_law: bool = False
     rare: bool = False
-
-    @property
-    def has_place(self) -> bool:
-        """Whether a refit may put it elsewhere; beside itself it is then another form."""
-        return "at" in self.tuned
-
-    @property
-    def as_usual(self) -> Variant:
-        """The same form wherever its trace is computed."""
-        return replace(self, trace=1.0)
 
     def number(self, name: str) -> float:
         """What a refit changes of ``at`` or ``width``: itself, or its logarithm."""
@@ -118,8 +111,6 @@ class Cause(ABC):
         1 if the amount cannot be negative, 0 if it can.
     combines : bool
         Whether several forms may act together (a profile along the cable is a sum of forms).
-    whole : bool
-        Whether the forms of a setting are components of one thing, of which none is there without the others.
     additive : bool
         Whether the amounts of forms acting together add up; else the largest is the size of the cause.
     limited : bool
@@ -132,7 +123,6 @@ class Cause(ABC):
     seat: ClassVar[str]
     sign: ClassVar[int] = 0
     combines: ClassVar[bool] = False
-    whole: ClassVar[bool] = False
     additive: ClassVar[bool] = False
     limited: ClassVar[bool] = False
 

@@ -33,8 +33,11 @@ BY_STEP, SCATTER = "differing from step to step", 0.3
 UNEQUAL = "of another moment at each bearing"
 """Label of bearings that rub differently: how much goes to the left one is tuned, from all to nothing."""
 
+EACH = "of each bearing"
+"""Setting of what each bearing has of its own."""
+
 SIDES = ("at the left bearing", "at the right bearing")
-"""Labels of what one bearing has alone: a dirty one, a clamp, a cable that is led in."""
+"""Labels of what one bearing has: a dirty one, a clamp, a cable that is led in."""
 
 
 def _at_bearings(model: Model, variant: Variant, change: Callable[[Support], Support]) -> Model:
@@ -43,6 +46,11 @@ def _at_bearings(model: Model, variant: Variant, change: Callable[[Support], Sup
     left = bending.left if one and variant.label != SIDES[0] else change(bending.left)
     right = bending.right if one and variant.label != SIDES[1] else change(bending.right)
     return replace(model, bending=replace(bending, left=left, right=right))
+
+
+def each_bearing(form: Variant) -> tuple[Variant, ...]:
+    """A form at either bearing, which need not be alike."""
+    return tuple(replace(form, label=side, setting=EACH, component=True, rare=True) for side in SIDES)
 
 
 class BearingFriction(Cause):
@@ -112,7 +120,6 @@ class BearingStiffness(Cause):
     name = "bearing_stiffness"
     unit = "N m/rad"
     sign = 1
-    combines = True
     seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
@@ -120,9 +127,9 @@ class BearingStiffness(Cause):
         return 0.05 * facts.moment_scale / facts.curvature_scale / facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both bearings alike, or one; a seal stiffens with its turn (1 + ``width`` turn^2)."""
+        """Both bearings alike, or each with a spring of its own; a seal stiffens with its turn (1 + ``width`` turn^2)."""
         stiffening = Variant("that stiffens with the turn", width=1.0, tuned=("width",), width_range=(0.0, 10.0))
-        return (Variant(), stiffening, *(Variant(side, rare=True) for side in SIDES))
+        return (Variant(), stiffening, *each_bearing(Variant()))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give the bearings the spring ``amount``, at rest."""
@@ -140,7 +147,6 @@ class RigidEnds(Cause):
     name = "rigid_ends"
     unit = "m"
     sign = 1
-    combines = True
     limited = True
     seat = "rig"
 
@@ -149,8 +155,9 @@ class RigidEnds(Cause):
         return 0.02 * facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both ends alike, or one; long ones too, as the trace at twice the plausible length points elsewhere."""
-        return tuple(Variant(side, trace=trace, rare=bool(side)) for side in ("", *SIDES) for trace in (1.0, 10.0))
+        """Both ends alike, or each its own; long ones too, as the trace at twice the plausible length points elsewhere."""
+        some = Variant(), Variant(trace=10.0)
+        return (*some, *(side for form in some for side in each_bearing(form)))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Make ``amount`` of the cable at the ends stiff; at most a fifth of its length."""
@@ -230,8 +237,6 @@ class InPlaneLoad(Cause):
 
     name = "in_plane_load"
     unit = "N/m"
-    combines = True
-    whole = True
     seat = "rig"
 
     def plausible(self, facts: Facts) -> float:
@@ -244,10 +249,10 @@ class InPlaneLoad(Cause):
         Displacement counts from the chord of the mounted cable, which was measured under the load or without it.
         """
         return (
-            Variant("along the chord"),
-            Variant("across the chord", at=1.0),
-            Variant("along the chord, mounted under it", setting=UNDER_LOAD),
-            Variant("across the chord, mounted under it", at=1.0, setting=UNDER_LOAD),
+            Variant("along the chord", component=True),
+            Variant("across the chord", at=1.0, component=True),
+            Variant("along the chord, mounted under it", setting=UNDER_LOAD, component=True),
+            Variant("across the chord, mounted under it", at=1.0, setting=UNDER_LOAD, component=True),
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:

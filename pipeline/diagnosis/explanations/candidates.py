@@ -8,6 +8,7 @@ from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.statistics.pairs import pair_gains
 from pipeline.diagnosis.statistics.score import descending
 from pipeline.diagnosis.statistics.twins import cosines
+from rod.inverse.extension import Term
 
 LEAST, MARGIN = 30.0, 0.35
 """Chi-square, and share of the best linear gain, that a cause may fall short of the best and still be refitted."""
@@ -19,7 +20,7 @@ MOST = 8
 def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = MARGIN, most: int = MOST) -> list[int]:
     """Causes worth a refit: those whose linear chi-square gain lies within a margin of the best.
 
-    A cause whose forms may act together counts with its best two: a load at an angle to the chord scores little along
+    A cause of several components counts with its best two: a load at an angle to the chord scores little along
     it and across it. The margin is that of single forms, else many forms of one cause would push out the others.
 
     ``any_sign``: scores of an inadmissible sign count too; about a base model in a false minimum of K0 the sign of a
@@ -30,7 +31,7 @@ def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = 
     best = gains.max(initial=0.0)
     needed = best - max(LEAST, margin * best)
     for k, cause in enumerate(suspicion.causes):
-        if cause.combines:
+        if any(suspicion.terms[form].variant.component for form in suspicion.of(k)):
             gains[k] = max(gains[k], _best_two_forms(suspicion, k))
     order = np.argsort(-gains, kind="stable")
     return [int(k) for k in order[:most] if gains[k] > max(needed, 0.0)]
@@ -53,13 +54,18 @@ MASKED = 20.0
 
 
 def kinds(suspicion: Suspicion, cause: int) -> list[int]:
-    """The best form of each kind of a cause; a kind shares setting, tuned numbers and, unless forms add up, label."""
+    """The best form of each kind of a cause: of `kind_of`, and of the same tuned numbers."""
     own, found = suspicion.of(cause), dict[tuple[object, ...], int]()
     for k in (int(k) for k in own[descending(suspicion.statistic[own])]):
-        form = suspicion.terms[k].variant
-        label = "" if suspicion.causes[cause].combines else form.label
-        found.setdefault((label, form.setting, form.tuned), k)
+        term = suspicion.terms[k]
+        found.setdefault((kind_of(term), term.variant.tuned), k)
     return list(found.values())
+
+
+def kind_of(term: Term) -> tuple[str, ...]:
+    """Setting, label and tuned numbers of a form; forms that add up and components of one thing share their setting."""
+    form = term.variant
+    return (form.setting,) if term.cause.combines or form.component else (form.setting, form.label, *form.tuned)
 
 
 def _best_two_forms(suspicion: Suspicion, cause: int) -> float:

@@ -1,8 +1,8 @@
 """Pairs of causes as they are fitted: a single cause with what scores beside it.
 
-A pair gets all forms of its causes, as a single cause has: without its lesser part a load at an angle leaves a wrong
-pair the better one. Forms with a place of their own (elements of friction, profiles along the cable) cost several
-refits, so only the best pairs get them (`in_any_form`).
+A pair gets all components of its causes, as a single cause has: without its lesser part a load at an angle leaves a
+wrong pair the better one. Sums of forms (elements of friction, profiles along the cable) cost several refits, so only
+the best pairs get them (`in_any_form`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
-from pipeline.diagnosis.explanations.forms import with_more_forms
+from pipeline.diagnosis.explanations.forms import in_all_forms, with_all_components
 from pipeline.diagnosis.explanations.free_profile import free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
@@ -56,37 +56,34 @@ def together(bench: Workbench, directions: Sequence[int]) -> list[Explanation]:
 
 
 def with_all_forms(bench: Workbench, found: list[Explanation]) -> list[Explanation]:
-    """Pairs, best first, with further forms of their causes; one that stays far above the best is left as it is."""
+    """Pairs, best first, with all components of their causes."""
     every: dict[frozenset[int], Explanation] = {}
     for pair in sorted(found, key=lambda e: -e.worth):
         if frozenset(pair.causes) not in every:
-            rival = min((e.fitted.chi2 for e in every.values()), default=np.inf)
-            every[frozenset(pair.causes)] = with_own_forms(bench, pair, rival=rival)
+            every[frozenset(pair.causes)] = with_components(bench, pair)
     return list(every.values())
 
 
-def with_own_forms(bench: Workbench, pair: Explanation, *, rival: float) -> Explanation:
-    """A pair with further directions of its causes (a load, a tilt), as far as they can bring it near a rival."""
-    fitted, hopeless, facts = pair.fitted, rival + LEAST, bench.facts
-    for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
-        if not kind.combines or any(form.has_place for form in kind.variants(facts)):
-            continue
-        for setting in {term.variant.setting for term in fitted.extension.terms if term.cause is kind}:
-            fitted = with_more_forms(bench.observation, fitted, kind, setting, hopeless=hopeless)
+def with_components(bench: Workbench, pair: Explanation) -> Explanation:
+    """A pair with the other components of what it has one of, such as the second one of a load."""
+    fitted = pair.fitted
+    for term in pair.fitted.extension.terms:
+        if term.variant.component:
+            fitted = with_all_components(bench.observation, fitted, term)
     return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted)
 
 
 def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanation]:
-    """The best pairs with further forms that have a place, and with profiles of any form; hopeless ones left out."""
+    """The best pairs with sums of forms, and with profiles of any form."""
     new: list[Explanation] = []
     for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
-        hopeless, fitted = min(e.fitted.chi2 for e in (*found, *new)) + LEAST, [pair.fitted]
+        fitted = [pair.fitted]
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
             if isinstance(kind, Profile):
                 fitted += free_profile(bench.observation, fitted[-1], kind) if fitted[-1].reduced_chi2 > FITS else []
-            elif kind.combines:
+            elif kind.additive:
                 for setting in {term.variant.setting for term in fitted[-1].extension.terms if term.cause is kind}:
-                    fitted.append(with_more_forms(bench.observation, fitted[-1], kind, setting, hopeless=hopeless))
+                    fitted.append(in_all_forms(bench.observation, fitted[-1], kind, setting))
         new += [explanation_of(pair.causes, bench.base, one) for one in dict.fromkeys(fitted) if one is not pair.fitted]
         new += by_step(bench, explanation_of(pair.causes, bench.base, fitted[-1]))
     return new

@@ -1,16 +1,16 @@
 """One cause put into the model, in the form or the few forms of it that explain the data best.
 
 A score says where to begin, and no more: a soft spot on one side looks like a stiff one on the other until it has found
-its place. So a refit starts from several forms. Of each setting (what all forms that act together have in common) the
-best goes on, and further forms are added where they may act together.
+its place. So a refit starts from several forms. The best of each kind goes on: with the other components of one thing, or
+as a sum of all forms where these add up.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kinds
-from pipeline.diagnosis.explanations.forms import as_one_form, with_more_forms
+from pipeline.diagnosis.explanations.candidates import LEAST, NEARLY_AS_LOUD, kind_of, kinds
+from pipeline.diagnosis.explanations.forms import as_one_form, in_all_forms, with_all_components
 from pipeline.diagnosis.explanations.free_profile import free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
@@ -39,20 +39,16 @@ def refits(
     to what was found. ``rival`` is the chi-square another cause has reached: one that stays far above it after its
     first fit is not tried from other starts and with further forms.
     """
-    kind, found = suspicion.causes[cause], list[Fit]()
-    first = _strong_profile(observation, base, suspicion, cause) if isinstance(kind, Profile) else None
-    if first is None:
-        best = _by_kind(observation, base, suspicion, cause, hopeless=rival + LEAST)
-        if kind.combines:
-            for (setting, *_), one in [*best.items()]:
-                best[setting,] = with_more_forms(observation, one, kind, setting, hopeless=rival + LEAST)
-                # one component alone is there for the evidence to choose
-                best |= {(setting, "alone"): one} if kind.whole else {}
-        # half a cost is minus the logarithm of a likelihood
-        enough = min(map(cost, best.values()), default=np.inf) - 2.0 * np.log(ALSO)
-        found = [one for one in best.values() if cost(one) < enough]
-    else:
-        found = [with_more_forms(observation, first, kind, "", hopeless=rival + LEAST)]
+    kind = suspicion.causes[cause]
+    found = [*_by_kind(observation, base, suspicion, cause, hopeless=rival + LEAST).values()]
+    if kind.additive:
+        found = [in_all_forms(observation, one, kind, one.extension.terms[-1].variant.setting) for one in found]
+    # one component alone is left beside all of them for the evidence to choose
+    parts = ((one, one.extension.terms[-1]) for one in found)
+    found += [with_all_components(observation, one, term) for one, term in parts if term.variant.component]
+    # half a cost is minus the logarithm of a likelihood
+    enough = min(map(cost, found), default=np.inf) - 2.0 * np.log(ALSO)
+    found = [one for one in dict.fromkeys(found) if cost(one) < enough]
     if isinstance(kind, Profile) and found:
         found += free_profile(observation, found[0], kind) if found[0].reduced_chi2 > FITS else []
         found += as_one_form(observation, found[-1])
@@ -72,15 +68,6 @@ def known_refits(
     return known[cause][1]
 
 
-def _strong_profile(observation: Observation, base: Fit, suspicion: Suspicion, cause: int) -> Fit | None:
-    """A profile along the cable in its best form where that leaves more than noise: other forms alone will not do."""
-    direction = suspicion.best(cause)
-    if direction is None or base.reduced_chi2 < FITS:
-        return None
-    first = fit_term(observation, base, suspicion, direction)
-    return None if first is None or first.reduced_chi2 < FITS else first
-
-
 def _by_kind(
     observation: Observation,
     base: Fit,
@@ -89,10 +76,7 @@ def _by_kind(
     *,
     hopeless: float,
 ) -> dict[tuple[str, ...], Fit]:
-    """The best fit of a single form of a cause for each kind (`kinds`); empty where no form can be simulated.
-
-    Forms that may act together are one kind in each setting.
-    """
+    """The best fit of a single form of a cause for each kind (`kind_of`); empty where no form can be simulated."""
     best: dict[tuple[str, ...], Fit] = {}
     enough: dict[str, int] = {}
     for direction in _first_forms(suspicion, cause):
@@ -107,9 +91,7 @@ def _by_kind(
         freedom = len(found.residual) - found.extension.size
         if found.converged and found.chi2 < freedom + 2.0 * np.sqrt(2.0 * freedom):
             enough[term.variant.label] = term.size
-        form = term.variant
-        kind = (form.setting,) if term.cause.combines else (form.setting, form.label, *form.tuned)
-        best[kind] = min(best.get(kind, found), found, key=cost)
+        best[kind_of(term)] = min(best.get(kind_of(term), found), found, key=cost)
     return best
 
 

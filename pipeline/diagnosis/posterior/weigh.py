@@ -68,7 +68,7 @@ def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:
     unnamed = {cause: found_at[0] for cause in UNNAMED if (found_at := extension.terms_of(cause))}
     causes = [t.cause for t in extension.terms if t.cause not in unnamed and not np.isfinite(t.variant.known)]
     # all components of one thing are one choice
-    whole = {cause for cause in causes if cause.whole and causes.count(cause) > 1}
+    whole = {t.cause for t in extension.terms if t.variant.component and causes.count(t.cause) > 1}
     tried = sum(_kinds(cause, facts, whole=False) for cause in causes if cause not in whole)
     tried += sum(_kinds(cause, facts, whole=True) for cause in whole)
     if unnamed:
@@ -79,5 +79,5 @@ def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:
 
 def _kinds(cause: Cause, facts: Facts, *, whole: bool) -> float:
     """Log of the number of forms of a cause that differ by more than a place; ``whole``: all components are one."""
-    labels = {("" if whole else form.label, form.setting) for form in cause.variants(facts)}
+    labels = {("" if whole and form.component else form.label, form.setting) for form in cause.variants(facts)}
     return float(np.log(max(len(labels), 1)))

@@ -12,14 +12,12 @@ from fixtures.memory import Slipping
 from fixtures.scores import refit_one
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.explanations import refit
-from pipeline.diagnosis.explanations.forms import may_join
 from pipeline.diagnosis.explanations.refit import Addition, linear_start
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.presentation.findings import too_large
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.inverse.extension import Term
 from rod.inverse.fit import fit
 
 SETTINGS = DiagnosisSettings()
@@ -33,17 +31,6 @@ def prepared(cable, seed):
 @pytest.fixture(scope="module")
 def plain():
     return prepared(Cable(), 6)
-
-
-def test_a_form_stands_beside_itself_only_where_its_place_is_its_own(plain):
-    """Loads in opposite directions are none; two spots are two spots."""
-    for name, again in (("in_plane_load", False), ("stiffness_varying", True)):
-        cause = next(cause for cause in SUSPECTS if cause.name == name)
-        for variant in cause.variants(plain.facts):
-            term, other = Term(cause, variant), Term(cause, replace(variant, trace=-variant.trace))
-            fitted = SimpleNamespace(extension=SimpleNamespace(terms=(term,)))
-            own = again and variant.has_place
-            assert may_join(term, fitted, variant.setting) is may_join(other, fitted, variant.setting) is own
 
 
 @pytest.mark.parametrize("distance", [0.86, -0.86])
