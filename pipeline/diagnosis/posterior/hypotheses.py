@@ -13,8 +13,8 @@ linear model about the base, the mean over the forms of the cause. What acts on 
 (`causes.unnamed`) is something else that is refitted. Ten times another share changes few words: with base 0.8 three
 more real effects of 59 stay silent, with 0.3 three nulls of 36 get a name.
 
-What is said is the likeliest of three: the base model, causes of the catalogue, or something else. Among causes the
-smallest set that holds 95 % of their probability cannot be told apart.
+What is said is the likeliest of three: the base model, causes of the catalogue, or something else. Among causes that
+the data make likelier than the base model, the smallest set that holds 95 % of their probability cannot be told apart.
 """
 
 from __future__ import annotations
@@ -37,6 +37,11 @@ LEVEL = 0.95
 """Probability that a set of names holds."""
 
 
+ALIKE = 0.1
+"""Log evidence: what exceeds the base model's by less is no likelier. Causes that the data cannot show have the same as
+the base model but for rounding."""
+
+
 class Hypothesis(NamedTuple):
     """Causes (indices of the catalogue) with log evidence, ``plain`` and with something else; ``found``: the refit."""
 
@@ -47,11 +52,12 @@ class Hypothesis(NamedTuple):
 
 
 class Believed(NamedTuple):
-    """A hypothesis with its probability."""
+    """A hypothesis with its probability, and by how much its log evidence exceeds that of the base model."""
 
     causes: tuple[int, ...]
     something_else: bool
     probability: float
+    gain: float
     found: Explanation | None
 
 
@@ -93,8 +99,11 @@ class Posterior:
         return [one for one in self.believed if one.found is not None and one.something_else]
 
     def credible(self) -> list[Believed]:
-        """The smallest set of causes, without something else, that holds 95 % of the probability of all these."""
-        named = [one for one in self.believed if one.causes and not one.something_else]
+        """The smallest set of causes, without something else, that holds 95 % of the probability of all these.
+
+        What the data make no likelier than the base model is no name for what was found.
+        """
+        named = [one for one in self.believed if one.causes and not one.something_else and one.gain > ALIKE]
         enough, whole, found = 0.0, sum(one.probability for one in named), []
         for one in named:
             found.append(one)
@@ -126,15 +135,15 @@ def posterior(hypotheses: Sequence[Hypothesis], causes: Sequence[Cause]) -> Post
                 best[key] = found
     many = max(len(causes), 1)
     ways = {0: 1, 1: many, 2: max(many * (many - 1) // 2, 1)}
-    rows = []
+    base, rows = next(one.plain for one in hypotheses if not one.causes), []
     for (_, something_else, _), (_, value, one) in best.items():
         share = SHARES[len(one.causes)][something_else] / ways[len(one.causes)]
-        rows.append((value + np.log(share), one, something_else))
+        rows.append((value + np.log(share), value - base, one, something_else))
     top = max(value for value, *_ in rows)
     weights = [float(np.exp(value - top)) for value, *_ in rows]
     whole = sum(weights)
     believed = [
-        Believed(one.causes, something_else, weight / whole, one.found)
-        for weight, (_, one, something_else) in zip(weights, rows, strict=True)
+        Believed(one.causes, something_else, weight / whole, gain, one.found)
+        for weight, (_, gain, one, something_else) in zip(weights, rows, strict=True)
     ]
     return Posterior(tuple(sorted(believed, key=lambda one: -one.probability)))
