@@ -93,10 +93,7 @@ class Fit:
     @property
     def as_logged(self) -> tuple[Array, Array]:
         """Residual (N,) and sensitivities (N, q), to first order, with displacements and rig as exact as stated."""
-        return self.without_errors(self.beyond_stated)
-
-    def without_errors(self, at: NDArray[np.int_]) -> tuple[Array, Array]:
-        """Residual (N,) and sensitivities (N, q), to first order, where the errors at some positions (k,) are none."""
+        at = self.beyond_stated
         return self.residual + self.jacobian[:, at] @ self.vector[at], np.delete(self.jacobian, at, axis=1)
 
     @property

@@ -127,7 +127,7 @@ class BearingStiffness(Cause):
         return 0.05 * facts.moment_scale / facts.curvature_scale / facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both bearings alike, or each with a spring of its own; a seal stiffens with its turn (1 + ``width`` turn^2)."""
+        """Both bearings alike, or each a spring of its own; a seal stiffens with its turn (1 + ``width`` turn^2)."""
         stiffening = Variant("that stiffens with the turn", width=1.0, tuned=("width",), width_range=(0.0, 10.0))
         return (Variant(), stiffening, *each_bearing(Variant()))
 
@@ -155,7 +155,7 @@ class RigidEnds(Cause):
         return 0.02 * facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both ends alike, or each its own; long ones too, as the trace at twice the plausible length points elsewhere."""
+        """Both ends alike, or each by itself; long ones too, whose trace points elsewhere than that of short ones."""
         some = Variant(), Variant(trace=10.0)
         return (*some, *(side for form in some for side in each_bearing(form)))
 

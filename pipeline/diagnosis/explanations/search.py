@@ -25,7 +25,7 @@ from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
 from pipeline.diagnosis.explanations.single_cause import ALSO, Refits, known_refits
-from pipeline.diagnosis.fits.search import Suspicion, beside_rig, suspect
+from pipeline.diagnosis.fits.search import Suspicion, beside_usual, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
@@ -249,7 +249,7 @@ def searched(bench: Workbench, known: Refits | None = None) -> Search:
     first = search.posterior
     silent = all(one.probability < MATTERS for one in first.believed if one.causes)
     silent = silent and first.word == "base"
-    about = beside_rig(bench.base, bench.suspicion)
+    about = beside_usual(bench.base, bench.suspicion)
     hidden = hidden_pair(about) if silent else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise
     fits = bench.base.reduced_chi2 < FITS

@@ -111,10 +111,9 @@ def suspect(observation: Observation, fitted: Fit, causes: Sequence[Cause], *, o
     return Suspicion(tuple(causes), tuple(terms), np.array(owner, dtype=int), sign, table, scores)
 
 
-def beside_rig(fitted: Fit, suspicion: Suspicion) -> Suspicion:
-    """The scores beside a rig that is off by no less than any rig is."""
-    known = fitted.without_errors(fitted.beyond_log)
-    return replace(suspicion, scores=score(*known, suspicion.columns, visible=VISIBLE))
+def beside_usual(fitted: Fit, suspicion: Suspicion) -> Suspicion:
+    """The scores beside displacements that scatter, and a rig that is off, as is usual."""
+    return replace(suspicion, scores=score(fitted.residual, fitted.jacobian, suspicion.columns, visible=VISIBLE))
 
 
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:
