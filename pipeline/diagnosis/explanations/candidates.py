@@ -30,7 +30,7 @@ def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = 
     np.maximum.at(gains, suspicion.owner, (suspicion.scores.z if any_sign else suspicion.statistic) ** 2)
     best = gains.max(initial=0.0)
     needed = best - max(LEAST, margin * best)
-    for k, cause in enumerate(suspicion.causes):
+    for k in range(len(suspicion.causes)):
         if any(suspicion.terms[form].variant.component for form in suspicion.of(k)):
             gains[k] = max(gains[k], _best_two_forms(suspicion, k))
     order = np.argsort(-gains, kind="stable")

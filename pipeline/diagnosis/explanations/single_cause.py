@@ -1,8 +1,8 @@
 """One cause put into the model, in the form or the few forms of it that explain the data best.
 
 A score says where to begin, and no more: a soft spot on one side looks like a stiff one on the other until it has found
-its place. So a refit starts from several forms. The best of each kind goes on: with the other components of one thing, or
-as a sum of all forms where these add up.
+its place. So a refit starts from several forms. The best of each kind goes on: with the other components of one thing,
+or as a sum of all forms where these add up.
 """
 
 from __future__ import annotations
