@@ -20,9 +20,6 @@ MOST = 8
 def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = MARGIN, most: int = MOST) -> list[int]:
     """Causes worth a refit: those whose linear chi-square gain lies within a margin of the best.
 
-    A cause of several components counts with its best two: a load at an angle to the chord scores little along
-    it and across it. The margin is that of single forms, else many forms of one cause would push out the others.
-
     ``any_sign``: scores of an inadmissible sign count too; about a base model in a false minimum of K0 the sign of a
     score says nothing.
     """
@@ -30,9 +27,6 @@ def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = 
     np.maximum.at(gains, suspicion.owner, (suspicion.scores.z if any_sign else suspicion.statistic) ** 2)
     best = gains.max(initial=0.0)
     needed = best - max(LEAST, margin * best)
-    for k in range(len(suspicion.causes)):
-        if any(suspicion.terms[form].variant.component for form in suspicion.of(k)):
-            gains[k] = max(gains[k], _best_two_forms(suspicion, k))
     order = np.argsort(-gains, kind="stable")
     return [int(k) for k in order[:most] if gains[k] > max(needed, 0.0)]
 
@@ -66,15 +60,3 @@ def kind_of(term: Term) -> tuple[str, ...]:
     """Setting, label and tuned numbers of a form; forms that add up and components of one thing share their setting."""
     form = term.variant
     return (form.setting,) if term.cause.combines or form.component else (form.setting, form.label, *form.tuned)
-
-
-def _best_two_forms(suspicion: Suspicion, cause: int) -> float:
-    """Linear chi-square gain of the best two forms of a cause together."""
-    own = suspicion.of(cause)
-    gains = pair_gains(
-        suspicion.scores.z[own],
-        cosines(suspicion.scores.unit[:, own]),
-        suspicion.sign[own],
-        np.arange(own.size),
-    )
-    return float(gains.max(initial=0.0))
