@@ -21,6 +21,7 @@ from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.fit import fit
 
 SETTINGS = DiagnosisSettings()
+BEARINGS = [cause.name for cause in SUSPECTS].index("bearing_stiffness")
 ELEMENTS = Slipping((2e-3, 1.3e-3), (1.0, 3.0))
 
 
@@ -69,6 +70,18 @@ def test_two_elements_that_slip_are_found_as_two():
         assert abs(value - truth) < 4.0 * std and std < 0.1 * truth
     amount, std = found.amount(SUSPECTS[index])
     assert amount == pytest.approx(np.dot(ELEMENTS.stiffness, ELEMENTS.slip), abs=4.0 * std)
+
+
+def test_springs_of_two_bearings_are_told_apart():
+    """One three times as stiff as the other, by collocation: both are components of one cause, each with its amount."""
+    spring = 2.4e-3
+    bench = prepared(Cable(bearing_stiffness=spring, sides=(1.0, 0.3)), 35)
+    found = refit_one(bench.observation, bench.base, bench.suspicion, BEARINGS)
+    told = {term.variant.label: found.fitted.amount(k) for k, term in enumerate(found.fitted.extension.terms)}
+    assert set(told) == {"at the left bearing", "at the right bearing"}
+    for label, share in zip(sorted(told), (1.0, 0.3), strict=True):
+        amount, std = told[label]
+        assert amount == pytest.approx(share * spring, abs=4.0 * std) and std < 0.25 * (1.0 - 0.3) * spring
 
 
 def test_a_bearing_that_yields_before_it_slips_is_no_friction_of_wires():

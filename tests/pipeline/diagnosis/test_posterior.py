@@ -258,6 +258,9 @@ def test_words():
     found = posterior(hypotheses, [0, 1])
     assert found.word == "causes" and [one.causes for one in found.credible()] == [(0,), (1,)]
     assert posterior([Hypothesis((), 0.0, 4.0), Hypothesis((0,), 1.0, -9.0)], [0]).word == "rest"
+    # what the data cannot show is as likely where nothing was found: no name for it, whichever way rounding goes
+    weak = [Hypothesis((), 0.0, -9.0), Hypothesis((0,), 3.0, -9.0), *(Hypothesis((k,), 1e-9, -9.0) for k in (1, 2, 3))]
+    assert [one.causes for one in posterior(weak, [0, 1, 2, 3]).credible()] == [(0,)]
     assert verdict(found=True, unmodelled=False, classes=((0, 1),), powerless=False) == "class"
     assert verdict(found=True, unmodelled=False, classes=((0,),), powerless=False) == "named"
     assert verdict(found=True, unmodelled=False, classes=((0,), (1,)), powerless=False) == "two_causes"
