@@ -108,8 +108,8 @@ class OtherLength(_Begun):
         return 2e-3 * facts.length
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Let ``amount`` slide out from the step ``at`` on."""
-        slid = (amount * self.course(variant, facts)).tolist()
+        """Let ``amount`` slide out from the step ``at`` on; a tenth of the cable is left."""
+        slid = np.minimum(amount * self.course(variant, facts), 0.9 * facts.length).tolist()
         return replace(model, bending=replace(model.bending, slid=tuple(slid)))
 
 
