@@ -34,7 +34,6 @@ class NonlinearStiffness(Cause):
 
     name = LAW
     unit = "N m^2"
-    combines = True
     seat = "cable"
 
     def plausible(self, facts: Facts) -> float:
