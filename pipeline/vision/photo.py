@@ -26,9 +26,8 @@ from pipeline.vision.photo_file import BROKEN, Header, is_sound, is_whole, opene
 
 Pixels = NDArray[np.uint8 | np.uint16]
 
-# EXIF orientation -> OpenCV operations that turn the stored picture into the displayed one
-_ROTATIONS = {3: cv2.ROTATE_180, 6: cv2.ROTATE_90_CLOCKWISE, 8: cv2.ROTATE_90_COUNTERCLOCKWISE}
-_MIRRORED = {2: (1, None), 4: (0, None), 5: (1, cv2.ROTATE_90_COUNTERCLOCKWISE), 7: (1, cv2.ROTATE_90_CLOCKWISE)}
+# EXIF orientation -> whether the stored picture is mirrored, left for right, and quarter turns to the left after that
+_TURNS = {2: (True, 0), 3: (False, 2), 4: (True, 2), 5: (True, 1), 6: (False, 3), 7: (True, 3), 8: (False, 1)}
 
 
 @dataclass(frozen=True)
@@ -166,13 +165,10 @@ def _decode(data: bytes, header: Header) -> Pixels | None:
         return None
     pixels: Pixels = np.asarray(picture, np.uint8 if picture.dtype == np.uint8 else np.uint16)
     if pixels.ndim == 3:
-        pixels = pixels[..., 0] if pixels.shape[2] in (1, 2) else _without_alpha(pixels)
-    return _turn(pixels, orientation)
-
-
-def _without_alpha(pixels: Pixels) -> Pixels:
+        pixels = pixels[..., 0] if pixels.shape[2] in (1, 2) else pixels[..., :3]
+    mirrored, quarters = _TURNS.get(orientation, (False, 0))
     # A copy in place of a view: OpenCV refuses interleaved views, and the four-channel original is freed.
-    return pixels if pixels.shape[2] == 3 else np.ascontiguousarray(pixels[..., :3])
+    return np.ascontiguousarray(np.rot90(pixels[:, ::-1] if mirrored else pixels, quarters))
 
 
 def _decode_by_pillow(data: bytes) -> Pixels | None:
@@ -192,15 +188,6 @@ def _decode_by_pillow(data: bytes) -> Pixels | None:
     except BROKEN:
         return None
     return None
-
-
-def _turn(pixels: Pixels, orientation: int) -> Pixels:
-    if orientation in _MIRRORED:
-        axis, rotation = _MIRRORED[orientation]
-        pixels = np.asarray(cv2.flip(pixels, axis), pixels.dtype)
-    else:
-        rotation = _ROTATIONS.get(orientation)
-    return pixels if rotation is None else np.asarray(cv2.rotate(pixels, rotation), pixels.dtype)
 
 
 def _bit_depth(pixels: Pixels) -> int:

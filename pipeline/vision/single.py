@@ -71,9 +71,7 @@ def shown(
     waves: Waves | None = None,
 ) -> Centerline | Rejected:
     """Centerline of a cable, with its picture."""
-    if isinstance(cable, Rejected):
-        return cable if preview is None else replace(cable, preview=preview)
-    line = centerline_of(cable, settings, told, waves)
-    if isinstance(line, Rejected):
-        return line if preview is None else replace(line, preview=preview)
-    return line if preview is None else replace(line, preview=with_strip(preview, line, cable.rough, settings.preview))
+    line = cable if isinstance(cable, Rejected) else centerline_of(cable, settings, told, waves)
+    if preview is not None and isinstance(cable, Followed) and isinstance(line, Centerline):
+        preview = with_strip(preview, line, cable.rough, settings.preview)
+    return line if preview is None else replace(line, preview=preview)

@@ -66,7 +66,7 @@ def continue_to_axes(
     told : AxesTold, optional
         What the other photos of the series tell of how the cable passes the axes.
     """
-    rows, values, noise = _bow_at_ends(fit, covariance, _LEAST_DEPARTURE)
+    rows, values, noise = _bow_at_ends(fit, covariance)
     past, misses, normals = _axes(fit, chord)
     if chord.marked:
         if told is None:
@@ -87,7 +87,7 @@ def sight_of_axes(fit: CurveFit, covariance: Array, chord: ChordFrame, *, width:
     """
     if not chord.marked:
         return None
-    step, covariance = _updated(covariance, *_bow_at_ends(fit, covariance, _LEAST_DEPARTURE))
+    step, covariance = _updated(covariance, *_bow_at_ends(fit, covariance))
     rows, misses, normals = _axes(fit, chord)
     loose = rows @ covariance @ rows.T + chord.axis_std**2 * np.eye(2)
     if not (np.isfinite(misses).all() and np.isfinite(loose).all()):
@@ -111,7 +111,7 @@ def _updated(covariance: Array, rows: Array, values: Array, noise: Array) -> tup
     return gain @ values, kept @ covariance @ kept.T + gain @ noise @ gain.T
 
 
-def _bow_at_ends(fit: CurveFit, covariance: Array, least: float) -> tuple[Array, Array, Array]:
+def _bow_at_ends(fit: CurveFit, covariance: Array) -> tuple[Array, Array, Array]:
     """Rows, values and noise of the departure from a bow at both ends: as along the seen part."""
     curve = fit.curve
     first, last = (quantile(fit.s, share) for share in (0.1, 0.9))
@@ -124,7 +124,7 @@ def _bow_at_ends(fit: CurveFit, covariance: Array, least: float) -> tuple[Array,
     rows = np.zeros((2, curve.frame.size))
     rows[:, 2:] = _departure(curve, curve.frame.knots[[0, -1]], a, b) - usual
     values = -rows[:, 2:] @ curve.coefficients
-    return rows, values, np.eye(2) * max(seen, (least * rms_of_bow(curve, 2)) ** 2)
+    return rows, values, np.eye(2) * max(seen, (_LEAST_DEPARTURE * rms_of_bow(curve, 2)) ** 2)
 
 
 def _departure(curve: PlaneCurve, s: Array, a: float, b: float) -> Array:

@@ -207,14 +207,7 @@ def _fit(sections: Sections, chord: ChordFrame, width: Array, *, moved: Array | 
     before, after = np.hypot(*(points[[0, -1]] - chord.axes).T)
     s = before + arc_lengths(points)
     std = np.maximum(sections.std, _LEAST_STD_PX) * width / sections.width
-    return fit_along(
-        points,
-        std,
-        guide=points,
-        s=s,
-        length=float(s[-1] + after),
-        diameter=median(width),
-    )
+    return fit_along(points, std, s=s, length=float(s[-1] + after), diameter=median(width))
 
 
 def waves_of(cables: Sequence[Followed | Rejected]) -> Waves:

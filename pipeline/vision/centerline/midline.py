@@ -171,7 +171,7 @@ def measure_sections(
     good = np.isfinite(place)
     if good.sum(axis=0).min() < LEAST_SECTIONS:
         return None
-    place, std, good = _consistent(place, std, good, _EDGE_OUTLIER, together=1.0 if waves else -1.0)
+    place, std, good = _consistent(place, std, good, together=1.0 if waves else -1.0)
     keep = np.asarray(good.any(axis=1))
     keep[keep] = _of_usual_width(place[keep].sum(axis=1) + 2.0 * half_width)
     keep = _between_pairs(keep, keep & good.all(axis=1))
@@ -257,7 +257,7 @@ def _running_median(values: Array) -> Array:
 
 
 def _consistent(
-    place: Array, std: Array, good: NDArray[np.bool_], outlier: float, *, together: float
+    place: Array, std: Array, good: NDArray[np.bool_], *, together: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Edges that contradict their neighbours replaced by the other edge and the local width.
 
@@ -267,7 +267,7 @@ def _consistent(
     filled = np.column_stack([np.interp(index, index[g], p[g]) for p, g in zip(place.T, good.T, strict=True)])
     local = np.column_stack([_running_median(p) for p in filled.T])
     off = np.abs(filled - local)
-    limit = outlier * MAD_TO_STD * medians(off, axis=0) + 0.02  # px; a floor for pictures without noise
+    limit = _EDGE_OUTLIER * MAD_TO_STD * medians(off, axis=0) + 0.02  # px; a floor for pictures without noise
     good = good & (off < limit)
     out, spread = filled.copy(), std.copy()
     for side, other in ((0, 1), (1, 0)):

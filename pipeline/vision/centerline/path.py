@@ -63,7 +63,6 @@ def fit_along(
     points: Array,
     std: Array,
     *,
-    guide: Array,
     s: Array,
     length: float,
     diameter: float,
@@ -74,8 +73,6 @@ def fit_along(
     ----------
     points : (n, 2)
     std : (n,)
-    guide : (n, 2)
-        Smooth path at the same arc lengths, for the start.
     s : (n,)
         About the arc lengths of the points from the left axis.
     length, diameter : float
@@ -83,8 +80,7 @@ def fit_along(
     """
     most = max(_MIN_INTERVALS, round(length / (_KNOT_SPACING_DIAMETERS * diameter)))
     intervals = min(most, max(_FIRST_INTERVALS, round(length / (_PATH_KNOT_DIAMETERS * diameter))))
-
-    guide_s = s
+    guide, guide_s = points, s
 
     def fit(correlation_length: float | None, iterations: int) -> CurveFit:
         frame = make_frame(0.0, length, intervals=intervals, order=_PENALTY_ORDER)

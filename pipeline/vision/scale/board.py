@@ -23,7 +23,7 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.settings.vision.scale import CalibrationSettings
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.scale.calibration import Calibration
-from pipeline.vision.scale.corners import Window, refine_corners
+from pipeline.vision.scale.corners import refine_corners
 from pipeline.vision.scale.plane import PlaneMap, project
 from pipeline.vision.scale.plane_fit import BoardView, PlaneFit, fit_views, homography_of
 
@@ -138,8 +138,8 @@ def _refined(photo: Photo, board: Board, points: Array, uv: Array) -> Array:
     to_picture = np.asarray(np.linalg.inv(homography_of((uv - middle) / size, points)), np.float64)
     half = 0.5 * board.square_m * np.eye(2)
     cells = [size * (project(to_picture, points + step) - project(to_picture, points - step)) for step in half]
-    window = Window.of(_marker_m(board) / board.square_m if board.charuco else 0.0)
-    return refine_corners(np.asarray(pixels), uv, np.stack(cells, axis=-1), window)
+    marker_share = _marker_m(board) / board.square_m if board.charuco else 0.0
+    return refine_corners(np.asarray(pixels), uv, np.stack(cells, axis=-1), marker_share)
 
 
 def _marker_m(board: Board) -> float:

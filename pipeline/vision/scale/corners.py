@@ -16,8 +16,6 @@ cable): 0.005 px where finders by gradients or by a response leave 0.03 to 0.15 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.special import erf
 
@@ -34,29 +32,7 @@ _CORNER_CONTRAST = 2.0  # half the step from black to white over the rms that th
 _CORNER_MOVE = 0.15  # squares; a corner found farther from its start is another thing
 
 
-@dataclass(frozen=True)
-class Window:
-    """Part of the board about a corner that shows nothing but its four squares, in squares.
-
-    Attributes
-    ----------
-    reach : float
-        Largest ``|a|`` and ``|b|``.
-    margin : float
-        Smallest of ``|a|`` and ``|b|`` at most: a cross along the edges, beside the markers of a ChArUco board.
-    """
-
-    reach: float
-    margin: float
-
-    @classmethod
-    def of(cls, marker_share: float) -> Window:
-        """Window beside markers that are ``marker_share`` of a square wide (0 without any)."""
-        reach = _CORNER_REACH
-        return cls(reach, min(reach, _CORNER_MARGIN * 0.5 * (1.0 - marker_share)))
-
-
-def refine_corners(grey: Array, uv: Array, cells: Array, window: Window) -> Array:
+def refine_corners(grey: Array, uv: Array, cells: Array, marker_share: float = 0.0) -> Array:
     """Corners fitted to the picture.
 
     Parameters
@@ -67,19 +43,21 @@ def refine_corners(grey: Array, uv: Array, cells: Array, window: Window) -> Arra
         Corners as a finder gives them, good to a few pixels.
     cells : (n, 2, 2) px
         Columns: what one square along a and along b is on the picture at each corner.
-    window : Window
+    marker_share : float
+        Of a square, width of the markers of a ChArUco board: a cross along the edges is used, beside them.
 
     Returns
     -------
     (n, 2) px
         NaN where the picture shows no such crossing.
     """
-    return np.array([_refined(grey, at, cell, window) for at, cell in zip(uv, cells, strict=True)])
+    margin = _CORNER_MARGIN * 0.5 * (1.0 - marker_share)
+    return np.array([_refined(grey, at, cell, margin) for at, cell in zip(uv, cells, strict=True)])
 
 
-def _refined(grey: Array, start: Array, cell: Array, window: Window) -> Array:
+def _refined(grey: Array, start: Array, cell: Array, margin: float) -> Array:
     lost = np.full(2, np.nan)
-    place, value = _pixels(grey, start, cell, window, _CORNER_REACH_PX)
+    place, value = _pixels(grey, start, cell, margin)
     square = float(np.hypot(*cell).min())
     if len(value) < _CORNER_PIXELS:
         return lost
@@ -98,14 +76,14 @@ def _refined(grey: Array, start: Array, cell: Array, window: Window) -> Array:
         if np.abs(move).max() < _CORNER_STEP_PX:
             break
     clear = abs(amount[1]) > _CORNER_CONTRAST * float(np.std(left))
-    stayed = np.hypot(*(at - start)) < _CORNER_MOVE * square and np.exp(log_sigma) < window.reach * square
+    stayed = np.hypot(*(at - start)) < _CORNER_MOVE * square and np.exp(log_sigma) < _CORNER_REACH * square
     return at if clear and stayed and np.abs(move).max() < 10.0 * _CORNER_STEP_PX else lost
 
 
-def _pixels(grey: Array, start: Array, cell: Array, window: Window, reach_px: float) -> tuple[Array, Array]:
-    """Places ``(n, 2)`` and values ``(n,)`` of the pixels in the window, at most ``reach_px`` from the corner."""
+def _pixels(grey: Array, start: Array, cell: Array, margin: float) -> tuple[Array, Array]:
+    """Places ``(n, 2)`` and values ``(n,)`` of the pixels about a corner, ``margin`` squares from an edge at most."""
     sides = np.hypot(*cell)
-    reach = np.minimum(window.reach, reach_px / sides)
+    reach = np.minimum(_CORNER_REACH, _CORNER_REACH_PX / sides)
     extent = np.ceil(np.abs(cell) @ reach).astype(int)
     low = np.maximum(np.round(start).astype(int) - extent, 0)
     high = np.minimum(np.round(start).astype(int) + extent, np.array(grey.shape[::-1]) - 1)
@@ -114,7 +92,7 @@ def _pixels(grey: Array, start: Array, cell: Array, window: Window, reach_px: fl
     v, u = np.mgrid[low[1] : high[1] + 1, low[0] : high[0] + 1]
     place = np.column_stack([u.ravel(), v.ravel()]).astype(np.float64)
     ab = np.abs((place - start) @ np.linalg.inv(cell).T)
-    inside = (ab < reach).all(axis=1) & (ab.min(axis=1) < window.margin)
+    inside = (ab < reach).all(axis=1) & (ab.min(axis=1) < margin)
     place = place[inside]
     return place, np.asarray(grey[place[:, 1].astype(int), place[:, 0].astype(int)], np.float64)
 

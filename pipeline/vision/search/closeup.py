@@ -1,7 +1,7 @@
 """The full-resolution grey window along a cable: projection, edge blur.
 
-Only the corridor along the path is projected; elsewhere the window is zero. That keeps a 12 Mpx colour photo at a few
-bytes a pixel: memory that is never written is never used.
+Only the columns that the corridor along the path has in a band of rows are projected; elsewhere the window is zero.
+That keeps a 12 Mpx colour photo at a few bytes a pixel: memory that is never written is never used.
 Units: px and fractions of full range.
 """
 
@@ -16,7 +16,7 @@ from pipeline.vision.photo import Photo, sampled
 from pipeline.vision.search.backdrop import Image, Standout
 
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
-_TILE = 128  # px; pieces of the window that are projected or left out
+_ROWS = 128  # px; of the window, projected at a time from the first to the last column that the corridor has there
 _CORRIDOR_WIDTHS = 2.25  # widths; half corridor kept at full resolution: noise is read up to 1.6 widths away
 
 
@@ -28,28 +28,18 @@ def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) 
     grey = np.zeros((high[1] - low[1], high[0] - low[0]), np.float32)
     scaled = (np.asarray(weights) / photo.full_scale).astype(np.float32)
     window = photo.pixels[low[1] : high[1], low[0] : high[0]]
-    for rows, columns in _stretches(path_px - low, margin, (grey.shape[1], grey.shape[0])):
+    for top in range(0, len(grey), _ROWS):
+        near = path_px[np.abs(path_px[:, 1] - low[1] - top - 0.5 * _ROWS) <= 0.5 * _ROWS + margin, 0] - low[0]
+        if not len(near):
+            continue
+        rows = slice(top, top + _ROWS)
+        columns = slice(max(0, int(near.min() - margin)), int(near.max() + margin) + 1)
         part = window[rows, columns]
         if part.ndim == 2:
             np.multiply(part, scaled[0], out=grey[rows, columns])
         else:
             cv2.transform(part.astype(np.float32), scaled[None, :], grey[rows, columns])
     return Standout.of_grey(grey, (int(low[0]), int(low[1])))
-
-
-def _stretches(path: Array, margin: float, size: tuple[int, int]) -> list[tuple[slice, slice]]:
-    """Rows and columns of the tiles that the corridor of half width ``margin`` touches, side by side ones together."""
-    reach = np.arange(-np.ceil(margin / _TILE), np.ceil(margin / _TILE) + 1) * min(margin, _TILE)
-    u, v = (np.add.outer(path[:, axis], reach).clip(0, size[axis] - 1) // _TILE for axis in (0, 1))
-    touched = np.zeros((size[1] // _TILE + 1, size[0] // _TILE + 1), np.int8)
-    touched[v.astype(int)[:, None, :], u.astype(int)[:, :, None]] = 1
-    edges = np.diff(np.pad(touched, ((0, 0), (1, 1))), axis=1)
-    return [
-        (slice(row * _TILE, (row + 1) * _TILE), slice(first * _TILE, last * _TILE))
-        for (row, first), (_, last) in zip(
-            np.argwhere(edges == 1).tolist(), np.argwhere(edges == -1).tolist(), strict=True
-        )
-    ]
 
 
 def edge_spreads(grey: Image, middle: Array, across: Array, width: float) -> Array:

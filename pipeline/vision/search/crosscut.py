@@ -307,20 +307,8 @@ def _at(values: Array, columns: Array) -> Array:
 
 
 def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
-    """Column on each row so that the sum of scores, less ``cost`` for each column moved, is largest.
-
-    From row to row the course moves by one column at most (dynamic programming).
-    """
-    rows, columns = score.shape
-    reached = np.full((rows, columns + 2), -np.inf, score.dtype)  # of each column as the course's last, one more beside
-    reached[0, 1:-1] = score[0]
-    moved = np.empty(columns, score.dtype)
-    for row in range(1, rows):
-        before, here = reached[row - 1], reached[row, 1:-1]
-        np.maximum(before[:-2], before[2:], out=moved)
-        moved -= cost
-        np.maximum(before[1:-1], moved, out=here)
-        here += score[row]
+    """Column on each row so that the sum of scores, less ``cost`` for each column moved, is largest."""
+    reached = _reached(score, cost)
     at = int(np.argmax(reached[-1]))
     course = [at - 1]
     for before in reached[-2::-1].tolist():  # single numbers: an array's would take ten times as long
@@ -330,13 +318,17 @@ def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
     return np.array(course[::-1])
 
 
-def _course_totals(score: Array, cost: float) -> Array:
-    """Largest sums ``(w,)`` along courses of `_best_course`, of scores ``(n, w, k)``."""
-    total = np.pad(score[0], ((0, 0), (1, 1)), constant_values=-np.inf)
-    for row in score[1:]:
-        moved = np.maximum(total[:, :-2], total[:, 2:]) - cost
-        total[:, 1:-1] = np.maximum(total[:, 1:-1], moved) + row
-    return np.asarray(total.max(axis=1))
+def _reached(score: Array, cost: float) -> Array:
+    """Largest sums ``(n, ..., k + 2)`` of scores ``(n, ..., k)`` up to each place of a course, one more on each side.
+
+    From row to row the course moves by one column at most (dynamic programming).
+    """
+    reached = np.full((*score.shape[:-1], score.shape[-1] + 2), -np.inf, score.dtype)
+    reached[0, ..., 1:-1] = score[0]
+    for before, here, row in zip(reached[:-1], reached[1:], score[1:], strict=True):
+        moved = np.maximum(before[..., :-2], before[..., 2:]) - cost
+        here[..., 1:-1] = np.maximum(before[..., 1:-1], moved) + row
+    return reached
 
 
 def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, known: bool) -> float:
@@ -347,7 +339,7 @@ def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, 
     """
     tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, _PAIR_WIDTHS)
     rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
-    totals = _course_totals(_pair_score(rise, fall, near, tried), _PAIR_WANDER_COST) / len(rise)
+    totals = _reached(_pair_score(rise, fall, near, tried), _PAIR_WANDER_COST)[-1].max(axis=1) / len(rise)
     if known:
         trust = np.exp(-0.5 * (np.log(tried / width) / _PAIR_WIDTH_STD) ** 2)
         return float(tried[np.argmax(totals * trust)])

@@ -26,7 +26,7 @@ from pipeline.vision.scale.calibration import (
     from_number,
     in_plane_of_cable,
 )
-from pipeline.vision.scale.corners import Window, refine_corners
+from pipeline.vision.scale.corners import refine_corners
 from pipeline.vision.scale.plane import Lens, PlaneMap
 from pipeline.vision.scale.plane_fit import BoardView, fit_views
 
@@ -146,7 +146,7 @@ def test_corners_are_placed_as_well_as_the_noise_allows(charuco: bool) -> None:
     turn = np.array([[np.cos(0.2), -np.sin(0.2)], [np.sin(0.2), np.cos(0.2)]])
     cells = np.broadcast_to(42.0 * turn, (len(truth), 2, 2))
     # beside markers of 0.6 squares only a cross along the edges is read
-    found = refine_corners(grey, near, cells, Window.of(0.6 if charuco else 0.0))
+    found = refine_corners(grey, near, cells, 0.6 if charuco else 0.0)
     limit = 0.02 / 0.84 * np.sqrt(2.0 * np.sqrt(np.pi) * np.hypot(1.0, 0.29) / (2.0 * 17.0))
     # a third more: blur, directions and light are fitted from the same pixels, and the edges fade at the corner
     assert np.sqrt(np.mean((found - truth) ** 2)) < 1.33 * limit
@@ -158,7 +158,7 @@ def test_no_corner_is_made_up_where_there_is_none() -> None:
     grey[:, 60:] += 80.0  # one edge, not two
     cells = np.broadcast_to(20.0 * np.eye(2), (3, 2, 2))
     places = np.array([[30.0, 40.0], [60.0, 40.0], [500.0, 40.0]])  # ground, edge, outside
-    assert np.isnan(refine_corners(grey, places, cells, Window.of(0.0))).all()
+    assert np.isnan(refine_corners(grey, places, cells)).all()
 
 
 def test_small_board_says_that_it_does_not_tell_the_border(tmp_path: Path) -> None:

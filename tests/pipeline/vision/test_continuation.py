@@ -44,7 +44,7 @@ def fitted(make):
         angle = np.interp(s, curve.s, curve.theta)
         points = at + ERROR * rng.standard_normal((160, 1)) * np.column_stack([-np.sin(angle), np.cos(angle)])
         std = np.full(160, ERROR)
-        fit = fit_along(points, std, guide=points, s=s, length=LENGTH, diameter=DIAMETER)
+        fit = fit_along(points, std, s=s, length=LENGTH, diameter=DIAMETER)
         found.append((fit, curve))
     return found
 
