@@ -157,23 +157,15 @@ def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Ar
         null=2 + order,
         std=std[used] / np.sqrt(weight[used]),
         position=s[used],
-        least=_bow_roughness(curve, order),
+        least=rms_of_bow(curve, order) ** 2 * float(np.ptp(curve.frame.knots)),
     )
-
-
-def _bow_roughness(curve: PlaneCurve, order: int) -> float:
-    """``int (d^k kappa / ds^k)^2 ds`` of a half wave from end to end whose curvature varies as much as the curve's.
-
-    An elastica between two bearings obeys ``kappa'' = -(P / EI) kappa``: it is no parabola, however little of the rest
-    the photo shows.
-    """
-    return rms_of_bow(curve, order) ** 2 * float(np.ptp(curve.frame.knots))
 
 
 def rms_of_bow(curve: PlaneCurve, order: int) -> float:
     """Rms of ``d^k kappa / ds^k`` of a half wave from end to end whose curvature varies as much as the curve's.
 
-    A sine of amplitude A has the variance ``A^2 (1/2 - 4/pi^2)``.
+    An elastica between two bearings obeys ``kappa'' = -(P / EI) kappa``: it is no parabola, however little of the rest
+    the photo shows. A sine of amplitude A has the variance ``A^2 (1/2 - 4/pi^2)``.
     """
     amplitude2 = float(np.var(curve.frame.values @ curve.coefficients)) / (0.5 - 4.0 / np.pi**2)
     return float(np.sqrt(0.5 * amplitude2) * (np.pi / np.ptp(curve.frame.knots)) ** order)

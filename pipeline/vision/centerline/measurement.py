@@ -91,10 +91,6 @@ class Followed:
         """How the cable passes its axes; None where that cannot be told to others, see `sight_of_axes`."""
         return sight_of_axes(self.fit, self.covariance, self.chord, width=middle_width(self.width)[0])
 
-    def tied(self, told: AxesTold | None) -> tuple[CurveFit, Array]:
-        """Curve and covariance with what is known of the axes."""
-        return continue_to_axes(self.fit, self.covariance, self.chord, width=middle_width(self.width)[0], told=told)
-
     def half_widths(self) -> HalfWidths:
         """Half the width along the sections that live on both edges: errors of the midline without its bend."""
         used = (self.fit.weight > 0.0) & (self.sections.balance > _LEAST_BALANCE)
@@ -242,7 +238,7 @@ def centerline_of(
     metres = median(width / sections.width)
     waves = seen_waves([followed.half_widths()]) if waves is None else waves
     errors = slow_errors(followed.fit, float(np.hypot(waves.own, waves.common)), waves.length)
-    fit, covariance = replace(followed, covariance=followed.covariance + errors).tied(told)
+    fit, covariance = continue_to_axes(followed.fit, followed.covariance + errors, chord, width=middle, told=told)
     feet = feet_of_axes(fit, chord)[0]
     s = np.linspace(feet[0], feet[1], max(settings.curve.points, 2 * fit.curve.frame.size))
     shape = _shape(

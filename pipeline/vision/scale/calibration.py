@@ -80,7 +80,8 @@ def from_found(
     if not found:
         return None
     parallax_std = axis_parallax_std(specimen, found, settings)
-    estimates = [_by_travel(found, displacements, parallax_std), _by_covers(found, specimen, settings)]
+    pixels = PlaneMap.from_scale(1.0)
+    estimates = [_by_travel(found, displacements, parallax_std, pixels), _by_covers(found, specimen, settings)]
     known = [estimate for estimate in estimates if estimate is not None]
     precise = [scale for scale in known if scale.std_relative < _MAX_SCALE_STD]
     if precise:
@@ -108,18 +109,11 @@ def axis_parallax_std(specimen: Specimen, found: list[RoughCable], settings: Cal
     return height / (specimen.camera.distance_m or settings.usual_distance_m)
 
 
-def chords_px(found: list[RoughCable]) -> Array:
-    """Distance ``(n,)`` of the bearing axes on each photo, px."""
-    return np.array([np.hypot(*np.subtract(cable.right.center_px, cable.left.center_px)) for cable in found])
-
-
-def _by_travel(
-    found: list[RoughCable], displacements: Array, parallax_std: float, plane: PlaneMap | None = None
-) -> Scale | None:
+def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: float, plane: PlaneMap) -> Scale | None:
     """Regression of the chord on the displacement: each metre of travel shortens it by one.
 
-    In px/m, or with chords on a ``plane`` in units of its scale. None without travel, and of axes that a person gave:
-    those on later photos are where log and scale put them.
+    With chords on a ``plane``, in units of its scale. None without travel, and of axes that a person gave: those on
+    later photos are where log and scale put them.
     """
     if any(axis.kind == "given" for cable in found for axis in (cable.left, cable.right)):
         return None
@@ -127,23 +121,19 @@ def _by_travel(
     travel = displacements[known] - displacements[known].mean() if known.any() else displacements
     if known.sum() < 2 or not np.ptp(travel) > 0:
         return None
-    chords = chords_px(found)[known]
-    slope = _shortening(chords, travel)
+    axes = np.array([[cable.left.center_px, cable.right.center_px] for cable in found])[known]
+    left, right = plane.to_plane(axes).reshape(-1, 2, 2).transpose(1, 0, 2)
+    chords = np.hypot(*(right - left).T)
+    slope = -float(travel @ (chords - chords.mean())) / float(travel @ travel)
+    if slope <= 0:
+        return None
     axis_std = np.array([np.hypot(cable.left.std_px, cable.right.std_px) for cable in found])[known]
     residual = chords - chords.mean() + slope * travel
     free = len(chords) - 2
-    spread = max(float(np.median(axis_std)), float(np.sqrt(residual @ residual / free)) if free > 0 else 0.0)
-    if slope <= 0:
-        return None
+    spread = float(np.median(axis_std) / np.median(plane.local_scale(axes)))
+    spread = max(spread, float(np.sqrt(residual @ residual / free)) if free > 0 else 0.0)
     std_relative = float(np.hypot(spread / float(np.sqrt(travel @ travel)) / slope, parallax_std))
-    if plane is not None:
-        ends = [plane.to_plane(np.array([cable.left.center_px, cable.right.center_px])) for cable in found]
-        slope = _shortening(np.array([np.hypot(*(right - left)) for left, right in ends])[known], travel)
     return Scale(slope, std_relative, Message("scale.travel"))
-
-
-def _shortening(chords: Array, travel: Array) -> float:
-    return -float(travel @ (chords - chords.mean())) / float(travel @ travel)
 
 
 def _by_covers(found: list[RoughCable], specimen: Specimen, settings: CalibrationSettings) -> Scale | None:

@@ -81,8 +81,21 @@ class Standout:
 
     @cached_property
     def levels(self) -> list[float]:
-        """Levels of that distance above which something stands out, the likeliest first; see `otsu_levels`."""
-        return otsu_levels(self.distance)
+        """Levels of that distance above which something stands out: Otsu's, then those that split what is above it.
+
+        Ground, shadow and cable are three classes. Levels are sought on the square root: noise and strong things get a
+        like share of the range.
+        """
+        top = float(self.distance.max()) + 1e-9
+        coded = (255.0 * np.sqrt(self.distance / np.float32(top))).astype(np.uint8)
+        levels: list[float] = []
+        for _ in range(1 + _HIGHER_LEVELS):
+            code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
+            levels.append(max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9))
+            coded = coded[coded > code]
+            if coded.size < 2:
+                break
+        return levels
 
     def to_cells(self, uv: Array) -> Array:
         """Cells (n, 2) of photo pixels (n, 2), ``(u, v)``."""
@@ -161,23 +174,6 @@ def _covariance(residual: Image) -> Array:
     enough = calm.shape[1] > len(calm) + 1
     covariance = np.atleast_2d(np.cov(calm, dtype=np.float64)) if enough else 0.0
     return covariance + MIN_GROUND_STD**2 * np.eye(len(sample))
-
-
-def otsu_levels(picture: Image) -> list[float]:
-    """Otsu's level, and those that split what stands above it once more: ground, shadow and cable are three classes.
-
-    Levels are sought on the square root: noise and strong things get a like share of the range.
-    """
-    top = float(picture.max()) + 1e-9
-    coded = (255.0 * np.sqrt(picture / np.float32(top))).astype(np.uint8)
-    levels: list[float] = []
-    for _ in range(1 + _HIGHER_LEVELS):
-        code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
-        levels.append(max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9))
-        coded = coded[coded > code]
-        if coded.size < 2:
-            break
-    return levels
 
 
 def in_one_colour(photo: Photo, standout: Standout) -> Photo | None:
