@@ -82,11 +82,6 @@ def find_cable(
     return refused(photo, "photo/width.slender", seen=_slenderness(found), stated=cable.slenderness)
 
 
-def _is_settled(found: RoughCable) -> bool:
-    """True of a strip that is surely the whole cable, so that no other reading is needed."""
-    return found.evidence.clear and not found.goes_on
-
-
 def _find_near(photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
     """Find the cable where a neighbour photo lets it be expected, then anywhere."""
     cable = replace(cable, bearings=replace(cable.bearings, sought=[]))
@@ -106,7 +101,7 @@ def _along_clicks(photo: Photo, cable: Cable) -> RoughCable | Rejected:
         standout = stand_out(photo, choose_reduction(photo.size, width))
         reading = reading_along(standout, cable.path_px, width)
         outcome = judge_strip(photo, standout, reading, reading.strips[0], cable)
-        judged.append(_Judged([outcome], [standout.to_pixels(reading.strips[0].path)], [width]))
+        judged.append(_Judged(outcome, standout.to_pixels(reading.strips[0].path), width))
     return _chosen(photo, judged)
 
 
@@ -147,17 +142,12 @@ def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | 
 
 def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected) -> bool:
     """Whether the cable is seen better in one colour: what is narrower or shorter may be a stripe or a half of it."""
-    if isinstance(in_one, Rejected) or _is_piece(in_one):  # a piece of the cable may be anything of that colour too
-        return False
+    if isinstance(in_one, Rejected) or any(finding.code == "photo/hidden-end" for finding in in_one.findings):
+        return False  # a piece of the cable may be anything of that colour too
     if isinstance(found, Rejected):
         return True
     larger = max(in_one.length_px / found.length_px, in_one.half_width_px / found.half_width_px)
     return larger > _WIDER or in_one.evidence.firmness > found.evidence.firmness
-
-
-def _is_piece(found: RoughCable) -> bool:
-    """True of a strip that more of it may follow."""
-    return any(finding.code == "photo/hidden-end" for finding in found.findings)
 
 
 def _read(photo: Photo, standout: Standout, wanted: Wanted, cable: Cable) -> RoughCable | Rejected:
@@ -168,42 +158,39 @@ def _read(photo: Photo, standout: Standout, wanted: Wanted, cable: Cable) -> Rou
             if judged:
                 break
             return _blank(photo) or _nothing(photo, standout, readings[0], known=wanted.width is not None)
-        judged += [_judged(photo, standout, reading, wanted, cable) for reading in readings]
+        for reading in readings:
+            judged += _judged(photo, standout, reading, wanted, cable)
         outcome = _chosen(photo, judged)
-        if isinstance(outcome, RoughCable) and _is_settled(outcome):
-            return outcome
+        if isinstance(outcome, RoughCable) and outcome.evidence.clear and not outcome.goes_on:
+            return outcome  # surely the whole cable: no other reading is needed
     return _chosen(photo, judged)
 
 
 class _Judged(NamedTuple):
-    """Outcomes of the long strips of one reading, and paths (k, 2) px and areas of the strips."""
+    """Outcome of a strip, and its path (k, 2) px and area."""
 
-    outcomes: list[RoughCable | Rejected]
-    paths: list[Array]
-    areas: list[float]
+    outcome: RoughCable | Rejected
+    path: Array
+    area: float
 
 
-def _judged(photo: Photo, standout: Standout, reading: Reading, wanted: Wanted, cable: Cable) -> _Judged:
+def _judged(photo: Photo, standout: Standout, reading: Reading, wanted: Wanted, cable: Cable) -> list[_Judged]:
+    """The long strips of one reading."""
     least = max(wanted.least_length, _RIVAL_SHARE * reading.longest)
     strips = [strip for strip in reading.strips if strip.length >= least]
-    judged = [judge_strip(photo, standout, reading, strip, cable) for strip in strips]
-    paths = [standout.to_pixels(strip.path) for strip in strips]
-    return _Judged(judged, paths, [strip.length * reading.width for strip in strips])
+    outcomes = [judge_strip(photo, standout, reading, strip, cable) for strip in strips]
+    pairs = zip(outcomes, strips, strict=True)
+    return [_Judged(one, standout.to_pixels(strip.path), strip.length * reading.width) for one, strip in pairs]
 
 
 def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     """The strip of all readings with the most evidence, or why there is none."""
-    likely = [found for reading in judged for found in reading.outcomes if isinstance(found, RoughCable)]
+    likely = [one.outcome for one in judged if isinstance(one.outcome, RoughCable)]
     # a shadow that lies apart from the cable is as long and fainter
     strongest = max((found.contrast for found in likely), default=0.0)
     likely = [found for found in likely if found.contrast >= min(_RIVAL_SHARE * strongest, strongest)]
     likely.sort(key=lambda found: -found.evidence.value)
-    refusals = [
-        (area, outcome, path)
-        for reading in judged
-        for outcome, path, area in zip(reading.outcomes, reading.paths, reading.areas, strict=True)
-        if isinstance(outcome, Rejected)
-    ]
+    refusals = [(one.area, one.outcome, one.path) for one in judged if isinstance(one.outcome, Rejected)]
     if not likely:
         return max(refusals, key=lambda refusal: refusal[0])[1]
     best = _widest_alike(likely)

@@ -74,14 +74,6 @@ the cable tells nothing of them.
 
 
 @dataclass(frozen=True)
-class Cover:
-    """Disc on the photo that hides the cable: centre (u, v) and radius with its margin, px."""
-
-    center: tuple[float, float]
-    radius: float
-
-
-@dataclass(frozen=True)
 class Sections:
     """Measured sections across the cable, in px of the photo.
 
@@ -127,18 +119,15 @@ class Sections:
     softest: float
 
 
-def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: tuple[Cover, ...]) -> NDArray[np.bool_]:
-    """Mask (n,) of the sections whose points at ``offset`` px from the path on both sides lie outside every cover."""
-    free = np.ones(len(s), dtype=bool)
-    if not covers:
-        return free
+def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: Array) -> NDArray[np.bool_]:
+    """Mask (n,) of the sections whose points at ``offset`` px from the path on both sides lie outside every cover.
+
+    ``covers`` (k, 3) are discs that hide the cable: centre (u, v) and radius with its margin, px.
+    """
     where, angle = curve.at(s)
     aside = offset * normals(angle)
-    for cover in covers:
-        for point in (where - aside, where + aside):
-            away = point - np.asarray(cover.center)
-            free &= (away * away).sum(axis=1) > cover.radius**2
-    return free
+    away = np.linalg.norm(np.stack([where - aside, where + aside])[:, :, None] - covers[:, :2], axis=-1)
+    return np.asarray((away > covers[:, 2]).all(axis=(0, 2)))
 
 
 def measure_sections(
@@ -297,15 +286,10 @@ def _systematic(profiles: Profiles, s: Array, width: float, doubt: Array, diamet
     by_blur = 0.5 * np.sqrt(np.mean((balance * np.diff(blur, axis=0)[0]) ** 2))
     # Where one edge counts alone, half the error of the cable's width is the midpoint's; ``doubt`` is half the change.
     by_likely = 0.5 * min(2.0 * share, 1.0) * np.sqrt(np.mean(lead**2) / np.mean(1.0 / doubt.sum(axis=0)))
-    unequal = _asymmetry(profiles.step)
+    one, two = medians(profiles.step, axis=1)
+    unequal = float(abs(two - one) / (0.5 * (two + one)))
     missing = 0.0 if diameter is None else abs(width - diameter)
     # What a caliper cannot have been off by is beside the weaker edge: a dark flank that is as dark as the ground.
     lost = max(missing - _WIDTH_PLAY * width, 0.0)
     by_diameter = (0.25 * min(missing, median(profiles.blur)) + 0.5 * lost) * min(unequal, 1.0)
     return float(np.sqrt(by_model**2 + by_blur**2 + by_likely**2 + by_diameter**2))
-
-
-def _asymmetry(step: Array) -> float:
-    """Relative difference of the two edges' contrast, from steps ``(2, n)``."""
-    one, two = medians(step, axis=1)
-    return float(abs(two - one) / (0.5 * (two + one)))

@@ -19,7 +19,6 @@ from pipeline.vision.centerline.edges import (
 from pipeline.vision.centerline.midline import (
     EDGE_WINDOW_BLURS,
     LEAST_SECTIONS,
-    Cover,
     Sections,
     free_of_covers,
     measure_sections,
@@ -170,21 +169,20 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     return sections
 
 
-def _covers(rough: RoughCable, blur: float) -> tuple[Cover, ...]:
+def _covers(rough: RoughCable, blur: float) -> Array:
     """Discs that hide the cable, larger by twice the blur and the errors of the circle: none of their edge is read."""
-    return tuple(
-        Cover(b.center_px, b.radius_px + 2.0 * blur + 3.0 * b.std_px + 3.0 * (b.radius_std_px or 0.0) + 1.0)
+    discs = [
+        (*b.center_px, b.radius_px + 2.0 * blur + 3.0 * b.std_px + 3.0 * (b.radius_std_px or 0.0) + 1.0)
         for b in (rough.left, rough.right)
         if b.radius_px
-    )
+    ]
+    return np.reshape(discs, (-1, 3))
 
 
-def _span(
-    path: PlaneCurve, seen: tuple[float, float], covers: tuple[Cover, ...], half_width: float
-) -> tuple[float, float] | None:
+def _span(path: PlaneCurve, seen: tuple[float, float], covers: Array, half_width: float) -> tuple[float, float] | None:
     """Range of s in which the cable is seen and neither edge is hidden."""
     s = np.arange(seen[0], seen[1], 1.0)
-    free = s[free_of_covers(path, s, _COVER_CHECK_RADII * half_width, covers)] if len(s) else s
+    free = s[free_of_covers(path, s, _COVER_CHECK_RADII * half_width, covers)]
     enough = len(free) > _LEAST_SEEN_RADII * half_width
     return (float(free[0]), float(free[-1])) if enough else None
 

@@ -190,7 +190,8 @@ def check_scale(
     travel = _by_travel(found, displacements, parallax_std, calibration.plane)
     covers = _by_covers(found, specimen, settings)
     if covers is not None:  # in units of the scale used
-        covers = replace(covers, px_per_m=covers.px_per_m / _local_scale(calibration, found))
+        axes = np.array([axis.center_px for cable in found for axis in (cable.left, cable.right)])
+        covers = replace(covers, px_per_m=covers.px_per_m / float(np.median(calibration.plane.local_scale(axes))))
     findings = []
     if covers is not None and covers.source != found_by.source and _off(covers, found_by):
         witnesses = [
@@ -234,11 +235,6 @@ def _by_length(
     paths = (calibration.plane.to_plane(cable.path_px) for cable in found)
     length = float(np.median([np.sum(np.hypot(*np.diff(path, axis=0).T)) for path in paths]))
     return Scale(length / specimen.length_m, settings.length_scale_std, _LENGTH)
-
-
-def _local_scale(calibration: Calibration, found: list[RoughCable]) -> float:
-    axes = np.array([axis.center_px for cable in found for axis in (cable.left, cable.right)])
-    return float(np.median(calibration.plane.local_scale(axes))) if len(axes) else calibration.scale.px_per_m
 
 
 def with_doubt_of_plane(line: Centerline, calibration: Calibration) -> Centerline:

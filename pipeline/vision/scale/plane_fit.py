@@ -187,8 +187,7 @@ def _least_squares(views: list[BoardView], start: Array, lens_std: float) -> _So
     """
     middle, radius = _picture(views[0])
     size = float(np.ptp(views[0].board_m))
-    scale = np.concatenate([[1.0], np.array([size, size, size, size, size, size, 1.0, 1.0])])
-    scale = np.concatenate([scale, *[np.array([1.0, size, size])] * (len(views) - 1)])
+    scale = np.array([1.0, *[size] * 6, 1.0, 1.0, *[1.0, size, size] * (len(views) - 1)])
 
     def corners(q: Array) -> Array:
         x = q * scale

@@ -12,7 +12,7 @@ from scipy.stats import norm
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.edge_profile import Pixels, fit_edges, fit_profiles, profile
 from pipeline.vision.centerline.edges import Ground, in_picture, search_edges, straighten
-from pipeline.vision.centerline.midline import Cover, free_of_covers, measure_sections
+from pipeline.vision.centerline.midline import free_of_covers, measure_sections
 
 BLUR, DARK, STEP = 0.9, 0.2, 0.6
 ACROSS = np.arange(-8.0, 7.0)
@@ -160,6 +160,6 @@ def test_sections_beside_the_picture_or_under_a_cover_are_left_out():
     inside = in_picture(strip_picture(), straight(v=20.0), s, 25.0)
     assert not inside.any()
     assert in_picture(strip_picture(), straight(), s, 25.0)[10:390].all()
-    free = free_of_covers(straight(), s, 15.0, (Cover((20.0, 60.0), 40.0),))
+    free = free_of_covers(straight(), s, 15.0, np.array([[20.0, 60.0, 40.0]]))
     hidden = np.hypot(s, 15.0) <= 40.0
     assert np.array_equal(free, ~hidden)

@@ -51,7 +51,8 @@ def test_a_longer_reading_forbids_a_strip_only_where_it_goes_on_beyond_it(more, 
     assert isinstance(found, RoughCable)
     longer = np.vstack([course, course[-1] + np.linspace(1.0, more * 26.0, 50)[:, None] * (1.0, 0.0)])
     cut = Rejected(photo.name, Message("photo/hidden-end.goes-on", u_px=1450.0, v_px=300.0))
-    chosen = segmentation._chosen(photo, [segmentation._Judged([found, cut], [found.path_px, longer], [1.0, 1.0])])
+    judged = [segmentation._Judged(found, found.path_px, 1.0), segmentation._Judged(cut, longer, 1.0)]
+    chosen = segmentation._chosen(photo, judged)
     assert getattr(chosen, "code", None) == code
 
 
