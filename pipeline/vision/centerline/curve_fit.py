@@ -26,6 +26,12 @@ from pipeline.vision.centerline.smoothing import Problem, Smooth
 from pipeline.vision.median import median, scatter
 from rod.measurement import slow_covariance
 
+_ITERATIONS = 8  # of a fit, at most
+_BIAS_SHARE = 0.5
+"""Part of the penalty's bias that counts as uncertainty: an equilibrium is smoother than the penalty's random walk;
+with 1 the 95 % band of kappa covered 98.6 % of smooth bows, with 0 92 %, with 0.5 97 %.
+"""
+
 
 @dataclass(frozen=True)
 class CurveFit:
@@ -88,8 +94,6 @@ def fit_curve(
     order: int,
     longest: float,
     correlation_length: float | None = None,
-    iterations: int = 8,
-    bias_share: float = 0.5,
 ) -> CurveFit:
     """Curve through points ``(n, 2)`` with relative errors ``std`` ``(n,)`` along the normal, by Gauss-Newton.
 
@@ -105,14 +109,11 @@ def fit_curve(
         Bound of the correlation length: longer errors cannot be told from the curve.
     correlation_length : length, optional
         Of the errors; sought if not given.
-    bias_share : float
-        Part of the penalty's bias that counts as uncertainty (`pipeline.vision.centerline.smoothing.Problem.smooth`).
-        Equilibria of a cable are smoother than the penalty's random walk: all of it would be too much.
     """
     curve, weight, moved = start, np.ones(len(points)), 0.0
     # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
     length = median(np.diff(s)) if correlation_length is None else correlation_length
-    for iteration in range(iterations):
+    for iteration in range(_ITERATIONS):
         s, residual = _step_to_foot(curve, points, s)
         spread = max(scatter(residual / std, 0.0), 1e-12)
         if iteration:
@@ -128,7 +129,7 @@ def fit_curve(
         # A hundredth of a point's error: the curve's own is a tenth to a third of it.
         if iteration > 1 and moved < 0.01 * spread:
             break
-    smooth = problem.smooth(length, bias_share=bias_share)
+    smooth = problem.smooth(length, bias_share=_BIAS_SHARE)
     curve = before.moved(smooth.estimate - before.parameters)
     s, residual = _step_to_foot(curve, points, curve.foot(points, s, steps=1))
     return CurveFit(curve, smooth, points, std, s, residual, weight)

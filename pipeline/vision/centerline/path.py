@@ -40,22 +40,14 @@ _MIN_SECTIONS = 240  # of a short cable; fewer would average over bends, their e
 _MAX_SECTIONS = 1000  # of a long cable; bounds the time of the fit
 _KNOT_SPACING_DIAMETERS = 1.5  # diameters; a cable cannot bend more sharply than over its own width
 _MIN_INTERVALS = 16  # knot intervals; fewer bias kappa at mid-span above 0.05 %
-_FIRST_INTERVALS = 36  # knot intervals tried first; a bow between two bearings uses ten to fifteen
-_CROWDED_SHARE = 0.6
-"""Of the parameters in effective use, above which knots are doubled: the penalty, not the knots, shall decide."""
-_PATH_KNOT_DIAMETERS = 5.0
-"""Diameters; knots of the path that the edges are sought along, and first try of a long cable."""
-_MOST_PATH_INTERVALS = 120  # knot intervals of that path; bounds the time
+_PATH_KNOT_DIAMETERS = 5.0  # diameters; knots of the path that the edges are sought along
+_MOST_INTERVALS = 120  # knot intervals; bounds the time, and of more of them a gap among the points makes a bad start
 _PENALTY_ORDER = 3
 """Derivative of kappa that is penalised: 3 leaves a parabola free, the bow's first shape; 2 was 30 % worse inside the
 span.
 """
 _LONGEST_CORRELATION_DIAMETERS = 2.0
 """Diameters; bound of the errors' correlation length, longer ones cannot be told from a bend."""
-_BIAS_SHARE = 0.5
-"""Part of the penalty's bias that counts as uncertainty: an equilibrium is smoother than the penalty allows; with 1 the
-95 % band of kappa covered 98.6 % of smooth bows, with 0 92 %, with 0.5 97 %.
-"""
 
 
 def fit_along(
@@ -66,7 +58,7 @@ def fit_along(
     length: float,
     diameter: float,
 ) -> CurveFit:
-    """Curve from axis to axis through points along it; knots are doubled while the data use nearly all of them.
+    """Curve from axis to axis through points along it: the penalty decides, not the knots.
 
     Parameters
     ----------
@@ -77,33 +69,16 @@ def fit_along(
     length, diameter : float
         From axis to axis, and of the cable; one unit with the points.
     """
-    most = max(_MIN_INTERVALS, round(length / (_KNOT_SPACING_DIAMETERS * diameter)))
-    intervals = min(most, max(_FIRST_INTERVALS, round(length / (_PATH_KNOT_DIAMETERS * diameter))))
-    guide, guide_s = points, s
-
-    def fit(correlation_length: float | None, iterations: int) -> CurveFit:
-        frame = make_frame(0.0, length, intervals=intervals, order=_PENALTY_ORDER)
-        return fit_curve(
-            points,
-            std,
-            start=initial_curve(guide, guide_s, frame),
-            s=s,
-            order=_PENALTY_ORDER,
-            longest=_LONGEST_CORRELATION_DIAMETERS * diameter,
-            correlation_length=correlation_length,
-            iterations=iterations,
-            bias_share=_BIAS_SHARE,
-        )
-
-    while intervals < most:  # long cables only
-        quick = fit(median(np.diff(s)), 2)
-        if quick.smooth.freedom < _CROWDED_SHARE * quick.curve.frame.size:
-            break
-        intervals = min(2 * intervals, most)
-        # more knots follow points with a gap among them worse than they follow the curve by fewer
-        s, guide_s = quick.s, np.linspace(0.0, length, 8 * intervals)
-        guide = quick.curve.at(guide_s)[0]
-    return fit(None, 8)
+    intervals = int(np.clip(length / (_KNOT_SPACING_DIAMETERS * diameter), _MIN_INTERVALS, _MOST_INTERVALS))
+    frame = make_frame(0.0, length, intervals=intervals, order=_PENALTY_ORDER)
+    return fit_curve(
+        points,
+        std,
+        start=initial_curve(points, s, frame),
+        s=s,
+        order=_PENALTY_ORDER,
+        longest=_LONGEST_CORRELATION_DIAMETERS * diameter,
+    )
 
 
 def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | None = None) -> Sections | Rejected:
@@ -126,7 +101,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
     points, s = rough.path_px[first : last + 1 : thin], along[first : last + 1 : thin]
     wanted = float(along[-1]) / (_PATH_KNOT_DIAMETERS * 2.0 * half_width)
-    intervals = int(np.clip(wanted, _MIN_INTERVALS, _MOST_PATH_INTERVALS))
+    intervals = int(np.clip(wanted, _MIN_INTERVALS, _MOST_INTERVALS))
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER)
     covers = _covers(rough, blur or 0.0)
