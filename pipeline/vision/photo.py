@@ -26,8 +26,16 @@ from pipeline.vision.photo_file import BROKEN, Header, is_sound, is_whole, opene
 
 Pixels = NDArray[np.uint8 | np.uint16]
 
-# EXIF orientation -> whether the stored picture is mirrored, left for right, and quarter turns to the left after that
-_TURNS = {2: (True, 0), 3: (False, 2), 4: (True, 2), 5: (True, 1), 6: (False, 3), 7: (True, 3), 8: (False, 1)}
+# EXIF orientation -> whether the stored picture is mirrored, left for right, and OpenCV's rotation after that
+_TURNS = {
+    2: (True, None),
+    3: (False, cv2.ROTATE_180),
+    4: (True, cv2.ROTATE_180),
+    5: (True, cv2.ROTATE_90_COUNTERCLOCKWISE),
+    6: (False, cv2.ROTATE_90_CLOCKWISE),
+    7: (True, cv2.ROTATE_90_CLOCKWISE),
+    8: (False, cv2.ROTATE_90_COUNTERCLOCKWISE),
+}
 
 
 @dataclass(frozen=True)
@@ -166,9 +174,11 @@ def _decode(data: bytes, header: Header) -> Pixels | None:
     pixels: Pixels = np.asarray(picture, np.uint8 if picture.dtype == np.uint8 else np.uint16)
     if pixels.ndim == 3:
         pixels = pixels[..., 0] if pixels.shape[2] in (1, 2) else pixels[..., :3]
-    mirrored, quarters = _TURNS.get(orientation, (False, 0))
     # A copy in place of a view: OpenCV refuses interleaved views, and the four-channel original is freed.
-    return np.ascontiguousarray(np.rot90(pixels[:, ::-1] if mirrored else pixels, quarters))
+    pixels = np.ascontiguousarray(pixels)
+    mirrored, rotation = _TURNS.get(orientation, (False, None))
+    pixels = np.asarray(cv2.flip(pixels, 1), pixels.dtype) if mirrored else pixels
+    return pixels if rotation is None else np.asarray(cv2.rotate(pixels, rotation), pixels.dtype)
 
 
 def _decode_by_pillow(data: bytes) -> Pixels | None:
