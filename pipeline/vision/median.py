@@ -1,4 +1,4 @@
-"""Medians that are NaN, and no warning, where there are no values; the robust standard deviation by them."""
+"""Medians that are NaN, and no warning, where there are no values; robust standard deviation and fit by them."""
 
 from __future__ import annotations
 
@@ -31,3 +31,18 @@ def quantile(values: NDArray[Any], share: float) -> float:
 def scatter(values: NDArray[Any], about: float | None = None) -> float:
     """Robust standard deviation of all values about their median, or ``about`` a number."""
     return MAD_TO_STD * median(np.abs(values - (median(values) if about is None else about)))
+
+
+def robust_fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients (k,) of the columns of ``terms`` (n, k), ones and others, that most of ``values`` (n,) follow.
+
+    Least squares with Tukey's biweight, which is zero beyond 4.685 sigmas: the rest are outliers.
+    """
+    found: NDArray[np.float64] = np.zeros(terms.shape[1])
+    found[0] = median(values)
+    for _ in range(8):
+        off = values - terms @ found
+        weight = np.clip(1.0 - (off / (4.685 * scatter(off, 0.0) + 1e-12)) ** 2, 0.0, None) ** 2
+        weighted = terms * weight[:, None]
+        found = np.asarray(np.linalg.solve(weighted.T @ terms + 1e-9 * np.eye(len(found)), weighted.T @ values))
+    return found

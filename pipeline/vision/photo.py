@@ -149,6 +149,14 @@ def sampled(picture: NDArray[Any], points: NDArray[np.floating]) -> NDArray[np.f
     return np.asarray(cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
+def values_at(photo: Photo, points: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Values ``(..., c)`` of a photo at points ``(..., 2)`` px as `sampled`, 0 black to 1 white."""
+    low = np.clip(np.floor(points.reshape(-1, 2).min(axis=0)).astype(int) - 1, 0, np.subtract(photo.size, 1))
+    high = np.clip(np.ceil(points.reshape(-1, 2).max(axis=0)).astype(int) + 2, low + 1, photo.size)
+    part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) / np.float32(photo.full_scale)
+    return sampled(part, points - low).reshape(*points.shape[:-1], -1)
+
+
 def levels(photo: Photo) -> tuple[float, float]:
     """Darkest and brightest of the broad parts of a picture, some sixty along its long side; 0 black, 1 white."""
     factor = max(1.0, max(photo.size) / 64.0)

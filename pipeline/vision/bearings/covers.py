@@ -37,6 +37,7 @@ from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_mar
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
+from pipeline.vision.search.backdrop import Standout, reduced
 from pipeline.vision.search.ends import CableEnd
 
 _RING_WIDTH = 0.05  # radii; std of the ring that seeks centres: as well as the radius is known
@@ -98,9 +99,12 @@ def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> 
 
 def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
     """As `find_cover`, by the rim alone: the first that is seen all round, else the largest part of one."""
-    window = _Window.cut(photo, end.place, _REACH_RADII * radius.px, radius.px)
-    if window is None:
+    low = np.maximum(np.floor(end.place - _REACH_RADII * radius.px).astype(int), 0)
+    high = np.minimum(np.ceil(end.place + _REACH_RADII * radius.px).astype(int) + 1, photo.size)
+    if (high - low < radius.px).any():
         return None
+    # reduced so that the circle keeps 16 to 32 cells
+    window = reduced(photo, max(1, int(radius.px / 16.0)), (int(low[0]), int(low[1]), int(high[0]), int(high[1])))
     along, aside = _along_cable(window, end)
     fall = np.maximum(np.abs(along) / radius.px - 1.4, 0.0) / 0.3
     prior = np.exp(-0.5 * (aside / (_ASIDE_STD_RADII * radius.px)) ** 2 - 0.5 * fall**2)
@@ -130,7 +134,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
 
 
 def _best_circle(
-    photo: Photo, radius: Radius, window: _Window, votes: NDArray[np.float32], softness: float
+    photo: Photo, radius: Radius, window: Standout, votes: NDArray[np.float32], softness: float
 ) -> Circle | None:
     """The circle with the most of its rim seen among the centres of the window with the most votes."""
     best: Circle | None = None
@@ -204,45 +208,21 @@ def _by_marks(photo: Photo, end: CableEnd, radius: Radius, partial: Circle | Non
     return replace(near[0], radius=radius.px, radius_std=0.1 * radius.px) if near else None
 
 
-@dataclass(frozen=True)
-class _Window:
-    """Square piece of the photo, reduced so that the circle keeps 16 to 32 cells."""
-
-    grey: NDArray[np.float32]
-    origin: Array
-    reduction: int
-
-    @classmethod
-    def cut(cls, photo: Photo, middle: Array, half: float, radius: float) -> _Window | None:
-        low = np.maximum(np.floor(middle - half).astype(int), 0)
-        high = np.minimum(np.ceil(middle + half).astype(int) + 1, photo.size)
-        if (high - low < radius).any():
-            return None
-        reduction = max(1, int(radius / 16.0))
-        size = tuple(int(side) // reduction for side in high - low)
-        part = photo.pixels[low[1] : high[1], low[0] : high[0]][: size[1] * reduction, : size[0] * reduction]
-        small = cv2.resize(part, size, interpolation=cv2.INTER_AREA).astype(np.float32) / np.float32(photo.full_scale)
-        return cls(small if small.ndim == 3 else small[..., None], low.astype(float), reduction)
-
-    def to_pixels(self, cells: Array) -> Array:
-        return np.asarray(cells * self.reduction + (self.reduction - 1) / 2.0 + self.origin)
-
-
-def _along_cable(window: _Window, end: CableEnd) -> tuple[Array, Array]:
+def _along_cable(window: Standout, end: CableEnd) -> tuple[Array, Array]:
     """Distance (px) of each cell beyond the end of the cable and aside of its axis."""
-    v, u = np.mgrid[: window.grey.shape[0], : window.grey.shape[1]]
+    v, u = np.mgrid[: window.picture.shape[0], : window.picture.shape[1]]
     du, dv = np.moveaxis(window.to_pixels(np.stack([u, v], axis=-1)) - end.place, -1, 0)
     return du * end.outward[0] + dv * end.outward[1], dv * end.outward[0] - du * end.outward[1]
 
 
-def _votes(window: _Window, radius: float, blind: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _votes(window: Standout, radius: float, blind: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Change of the mean grey value across a circle around each cell, colours together.
 
     That is the gradient correlated with a ring of radial directions (Daugman's operator): a faint rim adds up all
     round where texture cancels. Strong edges are clipped, and the cable's own, which are straight and would heap up
     beside it, are left out (``blind``).
     """
-    blurred = cv2.GaussianBlur(window.grey, (0, 0), max(0.7, 0.04 * radius))
+    blurred = cv2.GaussianBlur(window.picture, (0, 0), max(0.7, 0.04 * radius))
     gu = np.atleast_3d(cv2.Sobel(blurred, cv2.CV_32F, 1, 0))
     gv = np.atleast_3d(cv2.Sobel(blurred, cv2.CV_32F, 0, 1))
     strength = np.sqrt((gu**2 + gv**2).sum(axis=2))

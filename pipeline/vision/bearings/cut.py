@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from pipeline.records import Array
 from pipeline.vision.bearings.rim import CENTER_STD_FLOOR_PX, Circle, Radius
 from pipeline.vision.median import medians, scatter
-from pipeline.vision.photo import Photo, sampled
+from pipeline.vision.photo import Photo, values_at
 from pipeline.vision.search.ends import CableEnd, runs_of
 
 _ROWS, _HALF_WIDTHS = 21, 0.4  # rows along the cable, within so many widths of its middle: beyond is its shaded flank
@@ -43,12 +43,7 @@ def cover_by_cut(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -
     rows = np.linspace(-_HALF_WIDTHS, _HALF_WIDTHS, _ROWS) * width_px
     normal = np.array([-end.outward[1], end.outward[0]])
     points = end.place + along[:, None] * end.outward + rows[:, None, None] * normal
-    low = np.maximum(np.floor(points.min(axis=(0, 1))).astype(int) - 1, 0)
-    high = np.minimum(np.ceil(points.max(axis=(0, 1))).astype(int) + 2, photo.size)
-    if (high - low < 2).any():
-        return None
-    part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) / np.float32(photo.full_scale)
-    values = sampled(part, points - low).reshape(_ROWS, len(along), -1)
+    values = values_at(photo, points)
     sheath = medians(values[:, along < along[0] + 2.0 * width_px], axis=1)[:, None]
     off = values - sheath
     usual = np.linalg.norm(medians(off, axis=0), axis=1)

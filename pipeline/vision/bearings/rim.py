@@ -19,7 +19,7 @@ from scipy.special import ndtr
 
 from pipeline.records import Array
 from pipeline.vision.median import median, medians, quantile, scatter
-from pipeline.vision.photo import Photo, sampled
+from pipeline.vision.photo import Photo, values_at
 from pipeline.vision.rough import Bearing
 
 RADIUS_STD = 0.01  # relative; of a cover's radius in px where the scale is known: 0.1 mm on 12 mm, and light
@@ -150,16 +150,8 @@ def _radial_slopes(
     calm = span + 4.0 * (softness - 1.0)  # a soft edge reaches beyond the range in which it is sought
     offsets = np.arange(-calm - span, calm + span + 0.25, 0.5)
     distance = parameters[2] + offsets
-    reach = float(np.abs(distance[[0, -1]]).max())
-    low = np.maximum(np.floor(parameters[:2] - reach).astype(int) - 2, 0)
-    high = np.minimum(np.ceil(parameters[:2] + reach).astype(int) + 3, photo.size)
-    if (high - low < 4).any():
-        nothing = np.zeros((len(ray), len(offsets)), np.float32)
-        return _Slopes(offsets, nothing, nothing, 0.0, np.zeros(len(ray), bool))
-    part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32)
-    part *= np.float32(1.0 / photo.full_scale)
-    places = distance[:, None] * ray[:, None] + (parameters[:2] - low)
-    profile = sampled(part, places).reshape(*places.shape[:2], -1)
+    places = distance[:, None] * ray[:, None] + parameters[:2]
+    profile = values_at(photo, places)
     # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
     pooled = gaussian_filter(
         np.gradient(profile, 0.5, axis=1),
@@ -169,7 +161,7 @@ def _radial_slopes(
     slope: NDArray[np.float32] = np.asarray(pooled)
     norm = np.abs(slope[..., 0]) if slope.shape[2] == 1 else np.sqrt(np.einsum("ijc,ijc->ij", slope, slope))
     inner = np.abs(offsets) <= span
-    outside = ((places < 1) | (places > np.array(part.shape[1::-1]) - 2)).any(axis=2)
+    outside = ((places < 1) | (places > np.subtract(photo.size, 2))).any(axis=2)
     if one_sign:
         colour = np.broadcast_to(slope[:, np.abs(offsets) < 0.75].mean(axis=(0, 1)), (len(ray), slope.shape[2]))
     else:

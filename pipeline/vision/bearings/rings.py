@@ -27,7 +27,7 @@ from pipeline.vision.bearings.rim import (
     fit_circle,
 )
 from pipeline.vision.median import median
-from pipeline.vision.photo import Photo, reduce_area, sampled
+from pipeline.vision.photo import Photo, reduce_area, values_at
 
 MARK_CELLS = 12.0  # cells; a mark's largest radius in the picture it is searched on: a line stays a cell wide
 SAME_AXIS_RADII = 0.03  # radii; a ring farther off was not turned on the axis: a sticker, a hole beside it
@@ -169,13 +169,10 @@ def _slopes(photo: Photo, centers: Array, radius: float, step: float) -> Array:
     """Slope ``(k, m, c)`` of the mean grey value on circles about each of ``centers``, on radii ``step`` px apart."""
     angle = np.arange(64) * (np.pi / 32.0)
     distance = np.arange(0.06 * radius, 1.06 * radius, step)
-    low = np.maximum(np.floor(centers.min(axis=0) - 1.1 * radius).astype(int) - 1, 0)
-    high = np.minimum(np.ceil(centers.max(axis=0) + 1.1 * radius).astype(int) + 2, photo.size)
-    part = photo.pixels[low[1] : high[1], low[0] : high[0]]
     rays = distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])[:, None]
     # all centres in one picture: a row for each ray of each
-    values = sampled(part, (rays + (centers - low)[:, None, None]).reshape(-1, len(distance), 2))
-    mean = values.reshape(len(centers), len(angle), len(distance), -1).mean(axis=1) / photo.full_scale
+    values = values_at(photo, (rays + centers[:, None, None]).reshape(-1, len(distance), 2))
+    mean = values.reshape(len(centers), len(angle), len(distance), -1).mean(axis=1)
     return np.asarray(np.diff(mean, axis=1) / step)
 
 

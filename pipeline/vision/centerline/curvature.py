@@ -18,7 +18,7 @@ from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline, PPoly
+from scipy.interpolate import BSpline, CubicHermiteSpline
 
 from pipeline.records import Array
 
@@ -109,7 +109,7 @@ class _Nodes(NamedTuple):
     s: Array
     theta: Array
     tangent: Array
-    pieces: PPoly[np.float64]
+    pieces: CubicHermiteSpline[np.float64]
 
 
 @dataclass(frozen=True)
@@ -137,19 +137,9 @@ class PlaneCurve:
         tangent = np.column_stack([np.cos(theta), np.sin(theta)])
         nodes = frame.grid[::2]
         points = self.point + _integrate(tangent, frame.grid, frame.anchor)
-        # Cubic Hermite pieces of the position, for the tangents are known; of the angle parabolas through both ends and
-        # the middle of the cell.
-        width = np.diff(nodes)
-        wide = width[:, None]
-        step, first, last = np.diff(points, axis=0) / wide, tangent[:-2:2], tangent[2::2]
-        begin, middle, end = theta[:-2:2], theta[1::2], theta[2::2]
-        pieces = np.zeros((4, len(width), 3))  # by falling power of the distance from the cell's first node
-        pieces[0, :, :2], pieces[1, :, :2] = (first + last - 2 * step) / wide**2, (3 * step - 2 * first - last) / wide
-        pieces[2, :, :2], pieces[3, :, :2] = first, points[:-1]
-        pieces[1, :, 2], pieces[2, :, 2] = (begin + end - 2 * middle) / width**2, (4 * middle - 3 * begin - end) / width
-        pieces[1, :, 2] *= 2.0
-        pieces[3, :, 2] = begin
-        return _Nodes(nodes, theta, tangent, PPoly.construct_fast(pieces, nodes))
+        bend = frame.values[::2] @ self.coefficients
+        pieces = CubicHermiteSpline(nodes, np.c_[points, theta[::2]], np.c_[tangent[::2], bend])
+        return _Nodes(nodes, theta, tangent, pieces)
 
     def at(self, s: Array) -> tuple[Array, Array]:
         """Points ``(n, 2)`` and angles ``(n,)`` at ``s``; beyond the range the curve goes on straight."""

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.vision.median import median, scatter
+from pipeline.vision.median import median, robust_fit, scatter
 
 LEAST_SLOW_SECTIONS = 80  # edges of a side; fewer do not tell how far level and step depart from the polynomial
 _BLOCK = 8  # sections: short beside the bends of the polynomial, long beside texture
@@ -61,7 +61,7 @@ def steadied(place: Array, light: Array, covariance: Array, s: Array) -> tuple[A
     for k in (0, 1):
         for side in (0, 1):
             there, variance = known[side], covariance[side, known[side], k, k]
-            away = _off_slow(light[side, there, k], slow[there])
+            away = light[side, there, k] - slow[there] @ robust_fit(slow[there], light[side, there, k])
             # Letters and dirt are no light: what they do to a section says nothing of its place.
             near = np.abs(away) < 4.0 * np.sqrt(np.maximum(variance, scatter(away, 0.0) ** 2) + _ROUNDING)
             extra[side, k] = _extra(np.where(near, away, 0.0), variance, slow.shape[1])
@@ -74,18 +74,6 @@ def steadied(place: Array, light: Array, covariance: Array, s: Array) -> tuple[A
     gain = np.linalg.solve(allowed, shared[..., None])[..., 0] * plain[..., None]
     std = np.sqrt(np.maximum(covariance[..., 2, 2] - (gain * shared).sum(axis=-1), 0.0))
     return place - (gain * off).sum(axis=-1), std
-
-
-def _off_slow(values: Array, slow: Array) -> Array:
-    """Values ``(n,)`` less the combination of the columns of ``slow`` that most of them follow."""
-    off = values - median(values)
-    for _ in range(4):
-        # the root of Tukey's biweight
-        weight = np.clip(1.0 - (off / (6.0 * scatter(off, 0.0) + 1e-12)) ** 2, 0.0, None)
-        weighted = slow * (weight * weight)[:, None]
-        # Legendre's polynomials are nearly orthogonal: their normal equations lose no digits that matter.
-        off = values - slow @ np.linalg.solve(weighted.T @ slow, weighted.T @ values)
-    return np.asarray(off)
 
 
 def _extra(off: Array, variance: Array, followed: int) -> float:

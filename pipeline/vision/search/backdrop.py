@@ -14,7 +14,7 @@ Units: grey values are fractions of full range; pixels of the reduced photo are 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array
-from pipeline.vision.median import MAD_TO_STD, median, medians, scatter
+from pipeline.vision.median import MAD_TO_STD, medians, robust_fit
 from pipeline.vision.photo import Photo, reduce_area
 
 Image = NDArray[np.float32]
@@ -66,9 +66,9 @@ class Standout:
     picture: Image
 
     @classmethod
-    def of_grey(cls, grey: Image, origin_px: tuple[int, int]) -> Standout:
-        """A grey window ``(h, w)`` at full resolution, taken as it is."""
-        return cls(1, origin_px, grey[..., None], np.eye(1), grey[..., None])
+    def of(cls, picture: Image, offset_px: tuple[int, int], reduction: int = 1) -> Standout:
+        """A picture ``(h, w, c)`` taken as it is, without a ground."""
+        return cls(reduction, offset_px, picture, np.eye(picture.shape[2]), picture)
 
     @cached_property
     def distance(self) -> Image:
@@ -114,18 +114,23 @@ def choose_reduction(size: tuple[int, int], diameter_px: float | None) -> int:
     return max(1, int(diameter_px / CELLS_ACROSS))
 
 
-def stand_out(photo: Photo, reduction: int, *, window: tuple[int, int, int, int] | None = None) -> Standout:
-    """Reduce the photo (or the ``window`` u0, v0, u1, v1 of it) and take the ground away."""
+def reduced(photo: Photo, reduction: int, window: tuple[int, int, int, int] | None = None) -> Standout:
+    """The photo (or the ``window`` u0, v0, u1, v1 of it) reduced by averaging, taken as it is."""
     width, height = photo.size
     u0, v0, u1, v1 = window if window is not None else (0, 0, width, height)
     columns, rows = (u1 - u0) // reduction, (v1 - v0) // reduction
     part = photo.pixels[v0 : v0 + rows * reduction, u0 : u0 + columns * reduction]
     # Averages of 8 bits are kept in 8 bits: the rounding, 0.3 levels, is less than half of ``min_ground_std``.
     small = reduce_area(part, (columns, rows)).astype(np.float32)
-    small = small[..., None] if small.ndim == 2 else small
     small *= np.float32(1.0 / photo.full_scale)
-    residual = _above_ground(small)
-    return Standout(reduction, (u0, v0), residual, _covariance(residual), small)
+    return Standout.of(small[..., None] if small.ndim == 2 else small, (u0, v0), reduction)
+
+
+def stand_out(photo: Photo, reduction: int, *, window: tuple[int, int, int, int] | None = None) -> Standout:
+    """The photo (or the ``window`` u0, v0, u1, v1 of it) reduced, and the ground taken away."""
+    small = reduced(photo, reduction, window)
+    residual = _above_ground(small.picture)
+    return replace(small, residual=residual, covariance=_covariance(residual))
 
 
 def _above_ground(small: Image) -> Image:
@@ -138,7 +143,7 @@ def _above_ground(small: Image) -> Image:
     u, v = np.vander(_centred(width), 3, increasing=True), np.vander(_centred(height), 3, increasing=True)
     by_row = np.empty((3, width, channels), np.float32)  # of each power of v
     for channel in range(channels):
-        c = _robust_fit(terms, coarse[:, channel].astype(np.float64))
+        c = robust_fit(terms, coarse[:, channel].astype(np.float64))  # cable and objects are outliers of the ground
         by_row[..., channel] = np.array([[c[0], c[1], c[3]], [c[2], c[4], 0.0], [c[5], 0.0, 0.0]]) @ u.T
     # one matrix product for all channels: the surface in one pass over the picture, not six
     surface: Image = (v.astype(np.float32) @ by_row.reshape(3, -1)).reshape(small.shape)
@@ -148,19 +153,6 @@ def _above_ground(small: Image) -> Image:
 
 def _centred(count: int) -> Array:
     return np.asarray((np.arange(count) + 0.5) / count * 2.0 - 1.0)
-
-
-def _robust_fit(terms: Array, values: Array) -> Array:
-    """Least squares with Tukey's biweight: cable and objects are outliers of the ground."""
-    coefficients = np.zeros(6)
-    coefficients[0] = median(values)
-    for _ in range(8):
-        residual = values - terms @ coefficients
-        spread = scatter(residual, 0.0) + 1e-6
-        weight = np.clip(1.0 - (residual / (4.685 * spread)) ** 2, 0.0, None) ** 2  # zero beyond 4.685 sigma
-        normal = terms.T @ (weight[:, None] * terms) + 1e-9 * np.eye(6)
-        coefficients[:] = np.linalg.solve(normal, terms.T @ (weight * values))
-    return coefficients
 
 
 def _covariance(residual: Image) -> Array:

@@ -13,14 +13,12 @@ from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
-from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Image, Standout
-from pipeline.vision.search.crosscut import SMOOTHING_WIDTHS, find_flanks, path_normals, smooth_path, straighten
+from pipeline.vision.search.crosscut import cut_across
 from pipeline.vision.search.strips import (
     MIN_PIECE_WIDTHS,
     THICK_WIDTHS,
@@ -130,7 +128,7 @@ def _banded(standout: Standout, wanted: Wanted, width: float) -> Iterator[Readin
             continue
         for most in _BAND_WIDTHS:
             thick = thick_part(mask, most * width)
-            strips = _strips_in_bands(standout.distance, mask, thick, width, most)
+            strips = _strips_in_bands(standout, mask, thick, width, most)
             strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
             if strips:
                 yield Reading(tuple(strips), mask, thick, width, level)
@@ -159,12 +157,12 @@ def _guess_widths(above: NDArray[np.bool_]) -> list[tuple[float, float]]:
     return sorted(widths + new, key=lambda guess: -guess[0] * guess[1])
 
 
-def _strips_in_bands(picture: Image, mask: Mask, thick: Mask, width: float, most: float) -> list[Strip]:
+def _strips_in_bands(standout: Standout, mask: Mask, thick: Mask, width: float, most: float) -> list[Strip]:
     """Strips of the cable's width within the bands of a mask, longest first.
 
     Parameters
     ----------
-    picture : (h, w) ground sigmas
+    standout : Standout
         What the mask was made of.
     mask : (h, w)
     thick : (h, w)
@@ -175,28 +173,18 @@ def _strips_in_bands(picture: Image, mask: Mask, thick: Mask, width: float, most
         Of the widest band.
     """
     bands = find_strips(mask, thick, width, ratios=(WIDTH_RATIO_RANGE[0], most))
-    strips = [_cable_within(picture, band, width, 0.5 * (most - 1.0)) for band in bands]
+    strips = [_cable_within(standout, band, width, 0.5 * (most - 1.0)) for band in bands]
     return sorted((strip for strip in strips if strip is not None), key=lambda strip: -strip.length)
 
 
-def _cable_within(picture: Image, band: Strip, width: float, search: float) -> Strip | None:
+def _cable_within(standout: Standout, band: Strip, width: float, search: float) -> Strip | None:
     """The cable's strip in a band; None where most sections show no pair of edges."""
-    path = smooth_path(band.path, SMOOTHING_WIDTHS * width)
     # a skeleton runs into a corner of the band over its last half width
     corner = round(0.5 * band.width)
-    path = path[corner : len(path) - corner]
+    path = band.path[corner : len(band.path) - corner]
     if len(path) < MIN_PIECE_WIDTHS * width:
         return None
-    _, normal = path_normals(path)
-    straight, offsets = straighten(picture, path, normal, width)
-    flanks = find_flanks(straight[..., 0], offsets, width, known=True, search=search)
-    both = np.isfinite(flanks.left + flanks.right)
-    if both.mean() < _MIN_BAND_EDGES:
+    cut = cut_across(standout, path, width, known=True, search=search)
+    if len(cut.seen_widths) < _MIN_BAND_EDGES * len(cut.width):
         return None
-    middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
-    middle = gaussian_filter1d(median_filter(middle, 9, mode="nearest"), width, mode="nearest")
-    return replace(
-        band,
-        path=path + middle[:, None] * normal,
-        width=median((flanks.right - flanks.left)[both]),
-    )
+    return replace(band, path=cut.path, width=cut.usual_width)

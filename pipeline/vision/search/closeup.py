@@ -39,7 +39,7 @@ def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) 
             np.multiply(part, scaled[0], out=grey[rows, columns])
         else:
             cv2.transform(part.astype(np.float32), scaled[None, :], grey[rows, columns])
-    return Standout.of_grey(grey, (int(low[0]), int(low[1])))
+    return Standout.of(grey[..., None], (int(low[0]), int(low[1])))
 
 
 def edge_spreads(grey: Image, middle: Array, across: Array, width: float) -> Array:

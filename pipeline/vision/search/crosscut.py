@@ -27,14 +27,14 @@ from pipeline.vision.photo import sampled
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Image, Standout
 
-SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03
+_SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03
 _CORE = ((-0.35, 0.35),)  # widths from the middle
 _CLOSE_BY = ((-0.85, -0.65), (0.65, 0.85))  # widths; beyond the blur of the edges, within a jaw not twice as wide
 SEEN_SHARE = 0.4  # of the median contrast; from it on a section counts as seen
 _ARM_WIDTHS = 2.9  # widths from the middle to which what leaves a strip is followed: no bolt beside it reaches so far
 _ALIKE = 0.25  # of the step between strip and ground; grey levels nearer than that are those of one thing
 
-PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mask's middle half a width aside
+_PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mask's middle half a width aside
 _PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer
 _PAIR_WANDER_COST = 0.5  # usual edges for each column moved; a mask wanders slowly, a jump to a shadow's edge must pay
 _PAIR_WIDTH_RANGE = (0.45, 1.6)  # ratios to the width that are tried: half a cable along a highlight, and a shadow's
@@ -123,15 +123,16 @@ def cut_across(
     *,
     known: bool = False,
     weights: Array | None = None,
+    search: float = _PAIR_SEARCH_WIDTHS,
 ) -> CrossCut:
     """Measure the strip along a path, given its approximate width (``known``: from the diameter, else of the mask).
 
-    ``weights`` is the colour projection if it is not to be sought.
+    ``weights`` is the colour projection if it is not to be sought, ``search`` as in `find_flanks`.
 
     Strategy: straighten the residual picture along the path; colours of core and flanks give the projection; the pair
     of edges one width apart gives middle and width of each section (`find_flanks`).
     """
-    path = smooth_path(path, SMOOTHING_WIDTHS * width)
+    path = smooth_path(path, _SMOOTHING_WIDTHS * width)
     _, normal = path_normals(path)
     straight, offsets = straighten(standout.residual, path, normal, width)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
@@ -140,7 +141,7 @@ def cut_across(
     core = np.abs(offsets) < 0.35 * width
     sign = -1.0 if median(medians(relief[:, core], axis=1)) < 0 else 1.0
     relief *= sign
-    flanks = find_flanks(relief, offsets, width, known=known)
+    flanks = find_flanks(relief, offsets, width, known=known, search=search)
     step, beside = (_level(relief, offsets, flanks, *part) for part in (_CORE, _CLOSE_BY))
     both = np.isfinite(flanks.left + flanks.right)
     middle = np.where(both, 0.5 * (flanks.left + flanks.right), flanks.middle)
@@ -236,7 +237,7 @@ def find_flanks(
     width: float,
     *,
     known: bool,
-    search: float = PAIR_SEARCH_WIDTHS,
+    search: float = _PAIR_SEARCH_WIDTHS,
 ) -> Flanks:
     """Edges of the cable.
 

@@ -51,7 +51,7 @@ def test_a_crossing_is_where_something_like_it_leads_away_from_a_strip(name, dar
         else:
             cv2.circle(grey, start, round(rest[0]), 0.2, cv2.FILLED)
     grey += np.random.default_rng(1).normal(0.0, 0.01, grey.shape).astype(np.float32)
-    standout = Standout.of_grey((grey if dark else 1.0 - grey) - np.float32(0.8 if dark else 0.2), (0, 0))
+    standout = Standout.of((grey if dark else 1.0 - grey)[..., None] - np.float32(0.8 if dark else 0.2), (0, 0))
     path = np.column_stack([np.arange(60.0, 461.0), np.full(401, 100.0)])
     crossed = crossed_at(standout, cut_across(standout, path, 10.0))
     if list(ARMS).index(name) < 5:
