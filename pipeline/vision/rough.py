@@ -100,6 +100,11 @@ class RoughCable:
     evidence: Evidence = field(default_factory=Evidence)
 
     @property
+    def axes(self) -> tuple[Bearing, Bearing]:
+        """The left and the right bearing axis."""
+        return self.left, self.right
+
+    @property
     def length_px(self) -> float:
         """Length of the path from axis to axis, px."""
         return float(step_lengths(self.path_px).sum())

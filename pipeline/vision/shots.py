@@ -19,15 +19,7 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.cover_size import cover_radius
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.bearings.rim import SAME_RADIUS
-from pipeline.vision.bearings.steady import (
-    apart_px,
-    doubted,
-    expected_covers,
-    fixed_cover,
-    is_sure,
-    moved_axes,
-    stands_still,
-)
+from pipeline.vision.bearings.steady import fixed_cover, moved_axes
 from pipeline.vision.guard import guarded
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
@@ -80,20 +72,14 @@ class _Search:
         hints = self.specimen.hints.get(photo.name)
         return guarded(photo.name, partial(find_cable, photo, cable=cable, near=near, hints=hints))
 
-    def find(self, photo: Photo, step: LoadStep, near: Shot | None) -> RoughCable | Rejected:
-        """The cable by what specimen, scale and a neighbour photo tell."""
-        cable = self._expected(step.displacement_m - self.steps[0].displacement_m)
-        if near is None or isinstance(near.found, Rejected):
-            return self.find_as(photo, cable)
-        plane = None if self.calibration is None else self.calibration.plane
-        travel = step.displacement_m - near.step.displacement_m
-        seen = expected_covers(near.found, self.specimen.rig.moving_bearing, travel, plane)
-        return self.find_as(photo, replace(cable, bearings=replace(cable.bearings, seen=seen)), near.found)
+    def find(self, photo: Photo, step: LoadStep, near: RoughCable | None) -> RoughCable | Rejected:
+        """The cable by what specimen and scale tell, near where a neighbour photo shows it."""
+        return self.find_as(photo, self._expected(step.displacement_m - self.steps[0].displacement_m), near)
 
     def find_all(self) -> list[Shot]:
         """All photos, each searched near where the cable was on the one before."""
         shots: list[Shot] = []
-        near: Shot | None = None
+        near: RoughCable | None = None
         for step in self.steps:
             photo = self.load(step)
             if isinstance(photo, Rejected):
@@ -102,7 +88,7 @@ class _Search:
             found = self.find(photo, step, near)
             shown = guarded(photo.name, partial(reduce_photo, photo, self.settings.preview))
             shots.append(Shot(step, found, None if isinstance(shown, Rejected) else shown, photo.size))
-            near = shots[-1] if isinstance(found, RoughCable) else near
+            near = found if isinstance(found, RoughCable) else near
         return shots
 
     def _expected(self, travel: float) -> Cable:
@@ -171,10 +157,10 @@ def _once_more(search: _Search, shots: list[Shot]) -> list[Shot]:
     any width passes for the cable's; where its shaded side is as dark as the ground it seems narrower on some photos
     than on others. Its covers do not.
     """
-    there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
+    there = {k: shot.found for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)}
     if not there:
         return shots
-    last = there[0]  # all after it had a neighbour
+    last = min(there)  # all after it had a neighbour
     if search.calibration is None:
         search = replace(search, calibration=_scale_of_covers(search, shots))
         last = last if search.calibration is None else len(shots)
@@ -182,7 +168,7 @@ def _once_more(search: _Search, shots: list[Shot]) -> list[Shot]:
     for k, shot in enumerate(shots[:last]):
         photo = search.load(shot.step) if isinstance(shot.found, Rejected) and shot.preview is not None else None
         if isinstance(photo, Photo):
-            again = search.find(photo, shot.step, shots[min(there, key=lambda i: abs(i - k))])
+            again = search.find(photo, shot.step, there[min(there, key=lambda i: abs(i - k))])
             settled[k] = replace(shot, found=again) if isinstance(again, RoughCable) else shot
     return settled
 
@@ -190,7 +176,7 @@ def _once_more(search: _Search, shots: list[Shot]) -> list[Shot]:
 def _scale_of_covers(search: _Search, shots: list[Shot]) -> Calibration | None:
     """The scale by covers that are seen all round and alike on all photos; None if there are none, or of no size."""
     sure = [s.found for s in shots if isinstance(s.found, RoughCable) and s.found.left.sure and s.found.right.sure]
-    radii = [axis.radius_px for cable in sure for axis in (cable.left, cable.right) if axis.radius_px is not None]
+    radii = [axis.radius_px for cable in sure for axis in cable.axes if axis.radius_px is not None]
     diameter = search.specimen.rig.marker_diameter_m
     if diameter is None or not radii or np.ptp(radii) > 2.0 * SAME_RADIUS * np.median(radii):
         return None
@@ -202,7 +188,7 @@ def _with_axes_shown(shot: Shot) -> Shot:
     cable = shot.found
     if isinstance(cable, Rejected):
         return shot
-    clamps = [axis.center_px for axis in (cable.left, cable.right) if axis.kind == "clamp"]
+    clamps = [axis.center_px for axis in cable.axes if axis.kind == "clamp"]
     if not clamps:
         return shot
     u, v = clamps[0]
@@ -228,24 +214,23 @@ def with_fixed_cover(
     there = [k for k, shot in enumerate(shots) if isinstance(shot.found, RoughCable)]
     found = [shot.found for shot in shots if isinstance(shot.found, RoughCable)]
     scale = calibration.scale.px_per_m
-    play = settings.series.max_fixed_shift_m * scale
-    fixed = fixed_cover(found, play)
+    fixed = fixed_cover(found, settings.series.max_fixed_shift_m * scale)
     if fixed is None:
         return shots
     diameter = None if fixed.cover.radius_px is None else 2.0 * fixed.cover.radius_px
-    hints = BearingHints(cover_px=diameter, seen=(fixed.cover,))
+    hints = BearingHints(cover_px=diameter)
     expected = Cable(specimen.diameter_m * scale, specimen.length_m * scale, hints)
     search, settled = _Search(specimen, settings, calibration), list(shots)
     for k, cable in ((there[i], found[i]) for i in fixed.astray):
         photo = search.load(shots[k].step)
         again = photo if isinstance(photo, Rejected) else search.find_as(photo, expected)
-        if isinstance(again, RoughCable) and stands_still(again, fixed, play):
+        if isinstance(again, RoughCable) and fixed.is_shown_by(again):
             settled[k] = replace(shots[k], found=again)
-        elif not is_sure(cable, fixed.side):
-            said = Message("photo/bearing.astray", side=fixed.side, apart_m=apart_px(cable, fixed) / scale)
+        elif not fixed.taken(cable).sure:  # all that is sure stands where it was found
+            said = Message("photo/bearing.astray", side=fixed.side, apart_m=fixed.apart_px(cable) / scale)
             settled[k] = replace(shots[k], found=Rejected(cable.image, said))
         else:
-            settled[k] = replace(shots[k], found=doubted(cable, fixed.side))
+            settled[k] = replace(shots[k], found=fixed.doubted(cable))
     return settled
 
 

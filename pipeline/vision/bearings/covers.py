@@ -27,7 +27,6 @@ from pipeline.vision.bearings.cut import cover_by_cut
 from pipeline.vision.bearings.rim import (
     MIN_RIM,
     RADIUS_STD,
-    SAME_RADIUS,
     SURE_RIM,
     Circle,
     Radius,
@@ -42,10 +41,6 @@ from pipeline.vision.search.ends import CableEnd
 
 _RING_WIDTH = 0.05  # radii; std of the ring that seeks centres: as well as the radius is known
 _MARK_RADII = 0.95  # radii of a cover; largest dot, screw, bevel or bright middle that marks the axis of one not seen
-_EXPECTED_REACH_RADII = 2.5
-"""Radii; a cover of a neighbouring photo is sought again if the cable's end is so near: mostly it is one away, an end
-led astray by the cover's shadow two.
-"""
 _SOFT_RIM_PX = 2.5  # px; blur of a rim that is sought where no sharp one is seen: focus lost, or 3 % noise
 _MIN_SOFT_RIM = 0.5
 """Share of the rim where it is sought as a soft one: neighbouring directions share more, so chance gives more; focus
@@ -149,39 +144,6 @@ def _best_circle(
     return best
 
 
-def find_again(photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], radius: Radius) -> Circle | None:
-    """The cover at the end of a cable where other photos of the series let it be expected.
-
-    Parameters
-    ----------
-    photo : Photo
-    end : CableEnd
-    seen : tuple of Bearing
-        Covers of other photos, where they should be on this one.
-    radius : Radius
-        As in `find_cover`.
-
-    Returns
-    -------
-    Circle or None
-        None unless a cover of the same radius is seen where one is expected, all round or with a mark on its axis.
-    """
-    for cover in seen:
-        near = np.hypot(*np.subtract(cover.center_px, end.place)) <= _EXPECTED_REACH_RADII * radius.px
-        if cover.radius_px is None or not near or not cover.sure:
-            continue
-        rim = fit_circle(photo, np.array(cover.center_px), Radius(cover.radius_px, RADIUS_STD))
-        if rim is None:
-            continue
-        play = np.hypot(SAME_RADIUS * cover.radius_px, np.hypot(cover.radius_std_px or 0.0, rim.radius_std))
-        if abs(rim.radius - cover.radius_px) > play:
-            continue
-        circle = with_rings(photo, rim, radius)
-        if circle.sure:
-            return circle
-    return None
-
-
 def _by_marks(photo: Photo, end: CableEnd, radius: Radius, partial: Circle | None) -> Circle | None:
     """Cover whose rim shows in parts or not at all, by the dot, screw or bevel on its axis.
 
@@ -253,8 +215,6 @@ class BearingHints:
         Their diameter in diameters of the cable, where the scale is not known.
     given_px : pair of (u, v) or None
         Axes by the user.
-    seen : tuple of Bearing
-        Covers of a neighbouring photo, where they are to be expected on this one.
     sought : list
         Where strips end on this photo, and the cover found there or not.
     """
@@ -262,7 +222,6 @@ class BearingHints:
     cover_px: float | None = None
     cover_widths: float | None = None
     given_px: PixelPair | None = None
-    seen: tuple[Bearing, ...] = ()
     sought: list[tuple[Array, Circle | None]] = field(default_factory=list, compare=False)
 
     def cover_radius(self, width_px: float) -> float | None:
@@ -291,12 +250,9 @@ def find_bearings(
         if not alike:
             alike = [find_cover(photo, end, expected, width_px)]
             hints.sought.append((known, alike[0]))
-        circle = alike[0]
-        if circle is None or not circle.sure:
-            circle = find_again(photo, end, hints.seen, expected) or circle
-        if circle is None:
+        if alike[0] is None:
             break  # one is not enough, whatever the other would be
-        axes[k] = circle.as_bearing()
+        axes[k] = alike[0].as_bearing()
     return axes[0], axes[1]
 
 

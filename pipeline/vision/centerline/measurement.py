@@ -183,7 +183,7 @@ def _doubted(cable: Followed) -> Followed:
         return cable
     expected = np.diag(sight.covariance + told_alone(sight).covariance)
     beyond = np.sqrt(np.maximum(sight.miss**2 - expected, 0.0)) / median(cable.width / cable.sections.width)
-    pairs = zip((cable.rough.left, cable.rough.right), beyond, strict=True)
+    pairs = zip(cable.rough.axes, beyond, strict=True)
     left, right = (float(off) if axis.kind == "cover" and not axis.sure else 0.0 for axis, off in pairs)
     return cable.loosened(
         float(np.hypot(cable.rough.left.std_px, left)), float(np.hypot(cable.rough.right.std_px, right))
@@ -193,7 +193,7 @@ def _doubted(cable: Followed) -> Followed:
 def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
     """The cable with its visible ends (2, 2) px on its curve: the search put them into corners of a mask."""
     width = 2.0 * rough.half_width_px
-    left, right = (onto_curve(axis, end, width) for axis, end in zip((rough.left, rough.right), ends_px, strict=True))
+    left, right = (onto_curve(axis, end, width) for axis, end in zip(rough.axes, ends_px, strict=True))
     return replace(rough, left=left, right=right)
 
 

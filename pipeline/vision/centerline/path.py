@@ -105,7 +105,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER)
     covers = _covers(rough, blur or 0.0)
-    margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in (rough.left, rough.right)]
+    margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in rough.axes]
     span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width)
     if span is None:
         return _lost(rough, 0.0)
@@ -148,7 +148,7 @@ def _covers(rough: RoughCable, blur: float) -> Array:
     """Discs that hide the cable, larger by twice the blur and the errors of the circle: none of their edge is read."""
     discs = [
         (*b.center_px, b.radius_px + 2.0 * blur + 3.0 * b.std_px + 3.0 * (b.radius_std_px or 0.0) + 1.0)
-        for b in (rough.left, rough.right)
+        for b in rough.axes
         if b.radius_px
     ]
     return np.reshape(discs, (-1, 3))

@@ -85,7 +85,7 @@ def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: f
     One cover that is surely seen may be passed beside: not every cable runs through the axis of its bearing. One that
     is not may lie elsewhere than it was found, but the cable runs over its axis.
     """
-    axes = (rough.left, rough.right)
+    axes = rough.axes
     radii = feet_of_axes(fit, chord)[1] / (0.5 * middle) * [axis.radius_px is not None for axis in axes]
     doubted = [_BESIDE_COVER * radius for radius, axis in zip(radii, axes, strict=True) if not axis.sure]
     share = float(max(radii.min(), *doubted, 0.0))

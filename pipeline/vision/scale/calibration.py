@@ -103,7 +103,7 @@ def axis_parallax_std(specimen: Specimen, found: list[RoughCable], settings: Cal
     A point by h above the plane of the scale is seen farther out by h / distance; how high the covers of this rig are
     nobody says. The cable's own end and axes that the user pointed at have no cover.
     """
-    if all(axis.kind in ("end", "given") for cable in found for axis in (cable.left, cable.right)):
+    if all(axis.kind in ("end", "given") for cable in found for axis in cable.axes):
         return 0.0
     height = 0.5 * specimen.diameter_m + _COVER_HEIGHT_M
     return height / (specimen.camera.distance_m or settings.usual_distance_m)
@@ -115,7 +115,7 @@ def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: floa
     With chords on a ``plane``, in units of its scale. None without travel, and of axes that a person gave: those on
     later photos are where log and scale put them.
     """
-    if any(axis.kind == "given" for cable in found for axis in (cable.left, cable.right)):
+    if any(axis.kind == "given" for cable in found for axis in cable.axes):
         return None
     known = np.isfinite(displacements)
     travel = displacements[known] - displacements[known].mean() if known.any() else displacements
@@ -137,7 +137,7 @@ def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: floa
 
 
 def _by_covers(found: list[RoughCable], specimen: Specimen, settings: CalibrationSettings) -> Scale | None:
-    covers = [axis for cable in found for axis in (cable.left, cable.right) if axis.radius_px is not None]
+    covers = [axis for cable in found for axis in cable.axes if axis.radius_px is not None]
     if specimen.rig.marker_diameter_m is None or not covers:
         return None
     radii = np.array([cover.radius_px for cover in covers])
@@ -190,7 +190,7 @@ def check_scale(
     travel = _by_travel(found, displacements, parallax_std, calibration.plane)
     covers = _by_covers(found, specimen, settings)
     if covers is not None:  # in units of the scale used
-        axes = np.array([axis.center_px for cable in found for axis in (cable.left, cable.right)])
+        axes = np.array([axis.center_px for cable in found for axis in cable.axes])
         covers = replace(covers, px_per_m=covers.px_per_m / float(np.median(calibration.plane.local_scale(axes))))
     findings = []
     if covers is not None and covers.source != found_by.source and _off(covers, found_by):
