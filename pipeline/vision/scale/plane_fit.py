@@ -88,54 +88,62 @@ def _fit_plane_views(views: list[BoardView]) -> PlaneFit:
     middle, radius = _picture(views[0])
     start, moves = _start(views, middle, radius)
     fit = _least_squares(views, np.concatenate([[0.0], start, *moves]), USUAL_LENS)
-    homography, lens = _plane_parts(fit.x, middle, radius)
     source = Message("lens.fitted", k1=fit.x[0], std=np.sqrt(fit.covariance[0, 0]))
-    aside = tuple(PlaneMap(*_plane_parts(fit.x + step, middle, radius)) for step in _steps_aside(fit))
-    return PlaneFit(PlaneMap(homography, lens), fit.rms, *_scale_stds(fit, middle, radius), None, source, aside)
+    camera = np.array([[radius, 0.0, middle[0]], [0.0, radius, middle[1]], [0.0, 0.0, 1.0]])
+    return _plane_fit(fit, Lens(camera, np.zeros(5)), views[0], rms=fit.rms, lens_source=source)
+
+
+def _plane_fit(
+    fit: _Solution,
+    lens: Lens,
+    view: BoardView,
+    *,
+    rms: float,
+    lens_source: Message,
+    distance: float | None = None,
+    photo: str = "",
+) -> PlaneFit:
+    """The plane of a fit to corners without the distortion of a lens, which the fit's radial term adds to."""
+    middle, radius = _picture(view)
+    to_unit = np.array([[1 / radius, 0, -middle[0] / radius], [0, 1 / radius, -middle[1] / radius], [0, 0, 1]])
+    # k1 counts from half the diagonal in the fit, from the focal length in the lens
+    share = (float(lens.camera[0, 0]) / radius) ** 2
+
+    def plane_of(x: Array) -> PlaneMap:
+        homography = np.append(x[1:9], 1.0).reshape(3, 3) @ to_unit
+        return PlaneMap(homography, Lens(lens.camera, lens.distortion + np.r_[x[0] * share, np.zeros(4)]))
+
+    # A board that leaves the middle out, or that hardly tells the lens, tells the scale there by extrapolation.
+    around = np.array([[u, v] for u in (-0.9, 0.0, 0.9) for v in (-0.9, 0.0, 0.9) if u or v])
+    places = np.vstack([middle, middle * (1.0 + around)])
+
+    def logarithms(x: Array) -> Array:
+        return np.log(plane_of(x).local_scale(places))
+
+    steps = 1e-4 * fit.unit * np.eye(len(fit.x))
+    slopes = np.array([(logarithms(fit.x + step) - logarithms(fit.x - step)) / 2e-4 for step in steps])
+    change = slopes[:, 1:] - slopes[:, :1]
+    variance = np.mean(np.einsum("ij,ik,kj->j", change, fit.covariance, change))
+    # The other photos' own moves stay: they say nothing about the plane of the first.
+    values, vectors = np.linalg.eigh(fit.covariance[:9, :9])
+    aside = np.zeros((9, len(fit.x)))
+    aside[:, :9] = (vectors * np.sqrt(np.maximum(values, 0.0))).T * fit.unit[:9]
+    return PlaneFit(
+        plane_of(fit.x),
+        rms,
+        scale_std=float(np.sqrt(slopes[:, 0] @ fit.covariance @ slopes[:, 0])),
+        border_std=float(np.sqrt(variance)),
+        distance_m=distance,
+        lens_source=lens_source,
+        aside=tuple(plane_of(fit.x + step) for step in aside),
+        photo=photo,
+    )
 
 
 def _picture(view: BoardView) -> tuple[Array, float]:
     """Middle of the picture and half its diagonal, px."""
     width, height = view.size
     return np.array([0.5 * (width - 1), 0.5 * (height - 1)]), 0.5 * float(np.hypot(width, height))
-
-
-def _plane_parts(x: Array, middle: Array, radius: float) -> tuple[Array, Lens]:
-    """Homography from pixels and lens, of the parameters of `_least_squares`."""
-    homography = np.append(x[1:9], 1.0).reshape(3, 3) @ np.array(
-        [[1 / radius, 0, -middle[0] / radius], [0, 1 / radius, -middle[1] / radius], [0, 0, 1]]
-    )
-    camera = np.array([[radius, 0.0, middle[0]], [0.0, radius, middle[1]], [0.0, 0.0, 1.0]])
-    return homography, Lens(camera, np.array([x[0], 0.0, 0.0, 0.0, 0.0]))
-
-
-def _scale_stds(fit: _Solution, middle: Array, radius: float) -> tuple[float, float]:
-    """Relative standard deviations of the scale in the middle and of its change to the border, by all parameters.
-
-    A board that leaves the middle out, or that hardly tells the lens, tells the scale there by extrapolation.
-    """
-    around = np.array([[u, v] for u in (-0.9, 0.0, 0.9) for v in (-0.9, 0.0, 0.9) if u or v])
-    places = np.vstack([middle, middle * (1.0 + around)])
-
-    def logarithms(x: Array) -> Array:
-        return np.log(PlaneMap(*_plane_parts(x, middle, radius)).local_scale(places))
-
-    steps = 1e-4 * fit.unit * np.eye(len(fit.x))
-    slopes = np.array([(logarithms(fit.x + step) - logarithms(fit.x - step)) / 2e-4 for step in steps])
-    change = slopes[:, 1:] - slopes[:, :1]
-    variance = np.mean(np.einsum("ij,ik,kj->j", change, fit.covariance, change))
-    return float(np.sqrt(slopes[:, 0] @ fit.covariance @ slopes[:, 0])), float(np.sqrt(variance))
-
-
-def _steps_aside(fit: _Solution) -> Array:
-    """Steps ``(9, n)`` of the parameters along the principal directions of the covariance of lens and homography.
-
-    The other photos' own moves stay: they say nothing about the plane of the first.
-    """
-    values, vectors = np.linalg.eigh(fit.covariance[:9, :9])
-    steps = np.zeros((9, len(fit.x)))
-    steps[:, :9] = (vectors * np.sqrt(np.maximum(values, 0.0))).T * fit.unit[:9]
-    return steps
 
 
 @dataclass(frozen=True)
@@ -243,31 +251,15 @@ def _fit_free_views(views: list[BoardView]) -> list[PlaneFit]:
         distance = float(abs(cv2.Rodrigues(turn)[0][:, 2] @ np.ravel(shift)))
         start = np.append(0.0, _start([ideal], middle, radius)[0])
         fit = _least_squares([ideal], start, float(stds[4]) * (radius / focal) ** 2)
-        plane = PlaneMap(homography_of(ideal.uv, ideal.board_m), lens)
         # OpenCV counts distances, here as above coordinates.
-        made = PlaneFit(
-            plane,
-            float(rms) / np.sqrt(2.0),
-            *_scale_stds(fit, middle, radius),
-            distance if stds[0] < _DISTANCE_STD * focal else None,
-            source,
-            _aside_of(plane, fit, middle, radius),
-            view.name,
+        made = _plane_fit(
+            fit,
+            lens,
+            view,
+            rms=float(rms) / np.sqrt(2.0),
+            lens_source=source,
+            distance=distance if stds[0] < _DISTANCE_STD * focal else None,
+            photo=view.name,
         )
         found.append(made)
     return found
-
-
-def _aside_of(plane: PlaneMap, fit: _Solution, middle: Array, radius: float) -> tuple[PlaneMap, ...]:
-    """The plane with a lens of its own, moved as `_steps_aside` moves a fit of corners without their distortion."""
-    if plane.lens is None:
-        return ()
-    # k1 counts from half the diagonal in the fit, from the focal length in the lens
-    share = (float(plane.lens.camera[0, 0]) / radius) ** 2
-    back = np.linalg.inv(_plane_parts(fit.x, middle, radius)[0]) @ plane.homography
-    aside = []
-    for step in _steps_aside(fit):
-        bent = plane.lens.distortion + np.r_[step[0] * share, np.zeros(4)]
-        moved = _plane_parts(fit.x + step, middle, radius)[0]
-        aside.append(PlaneMap(moved @ back, Lens(plane.lens.camera, bent)))
-    return tuple(aside)
