@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pipeline.messages import Message
 from pipeline.records import Array
 from pipeline.vision.median import median, scatter
-from pipeline.vision.photo import sampled
+from pipeline.vision.photo import straightened
 from pipeline.vision.polyline import step_lengths
 
 _PER_WIDTH = 10  # columns of the straightened picture a width, one a px at least
@@ -173,8 +173,7 @@ def _straightened(course: Course, width: float) -> tuple[NDArray[np.float32], Ar
     """Grey ``(n, m)`` along the midline with the cable dark, and the offsets of its columns, px."""
     spacing = max(1.0, width / _PER_WIDTH)
     offset = np.arange(-np.ceil(2.1 * width / spacing), np.ceil(2.1 * width / spacing) + 1.0) * spacing
-    at = (course.middle - course.origin_px)[:, None, :] + offset[None, :, None] * course.across[:, None, :]
-    grey = sampled(course.grey, at)
+    grey = straightened(course.grey, course.middle - course.origin_px, course.across, offset)[..., 0]
     return grey if course.dark else -grey, offset
 
 

@@ -149,6 +149,14 @@ def sampled(picture: NDArray[Any], points: NDArray[np.floating]) -> NDArray[np.f
     return np.asarray(cv2.remap(picture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
+def straightened(
+    picture: NDArray[Any], path: NDArray[np.floating], across: NDArray[np.floating], offsets: NDArray[np.floating]
+) -> NDArray[np.float32]:
+    """Values ``(n, m, c)`` of a picture at ``offsets`` (m,) from points (n, 2) along unit vectors (n, 2)."""
+    points = path[:, None] + offsets[:, None] * across[:, None]
+    return sampled(picture, points).reshape(len(path), len(offsets), -1)
+
+
 def values_at(photo: Photo, points: NDArray[np.floating]) -> NDArray[np.float32]:
     """Values ``(..., c)`` of a photo at points ``(..., 2)`` px as `sampled`, 0 black to 1 white."""
     low = np.clip(np.floor(points.reshape(-1, 2).min(axis=0)).astype(int) - 1, 0, np.subtract(photo.size, 1))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.records import Array, Centerline, Preview
 from pipeline.settings.vision.photo import PreviewSettings
 from pipeline.vision.median import quantile
-from pipeline.vision.photo import Photo, reduce_area, sampled
+from pipeline.vision.photo import Photo, reduce_area, straightened
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.crosscut import path_normals
@@ -47,8 +47,8 @@ def with_strip(preview: Preview, line: Centerline, rough: RoughCable, settings: 
     _, normal = path_normals(points)
     normal *= -1.0 if line.mirrored else 1.0
     half = _STRIP_WIDTHS * 2.0 * rough.half_width_px
-    across = np.linspace(-half, half, _STRIP_HEIGHT_PX)[:, None, None]
-    strip = sampled(rough.grey, points - rough.origin_px + across * normal)
+    across = np.linspace(-half, half, _STRIP_HEIGHT_PX)
+    strip = straightened(rough.grey, points - rough.origin_px, normal, across)[..., 0].T
     picture = np.asarray(cv2.cvtColor(_stretched(strip, line, s, along), cv2.COLOR_GRAY2BGR), np.uint8)
     zoom = (_STRIP_HEIGHT_PX - 1) / (2.0 * half)
     middle = 0.5 * (_STRIP_HEIGHT_PX - 1)

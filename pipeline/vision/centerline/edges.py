@@ -21,7 +21,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, median_filter
@@ -30,6 +29,7 @@ from pipeline.records import Array
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Float32, Pixels
 from pipeline.vision.median import median, medians, scatter
+from pipeline.vision.photo import straightened
 from pipeline.vision.search.crosscut import steepest
 
 SEARCH_RADII = 0.35
@@ -51,17 +51,6 @@ class Ground:
 def normals(angle: Array) -> Array:
     """Unit normals ``(n, 2)``: direction of t."""
     return np.column_stack([-np.sin(angle), np.cos(angle)])
-
-
-def straighten(ground: Ground, curve: PlaneCurve, s: Array, t: Array) -> Float32:
-    """Grey values ``(n, m)`` at sections ``s`` and offsets ``t``, bilinear; NaN outside the picture."""
-    where, angle = curve.at(s)
-    across = normals(angle)
-    from_corner = (where - ground.origin_px).astype(np.float32)
-    u, v = (from_corner[:, k, None] + np.outer(across[:, k], t).astype(np.float32) for k in (0, 1))
-    outside = float("nan")
-    grey = cv2.remap(ground.grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=outside)
-    return np.asarray(grey, np.float32)
 
 
 def in_picture(ground: Ground, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:
@@ -112,11 +101,12 @@ def search_edges(
     s = span[0] + (np.arange(count * block) + 0.5) * (span[1] - span[0]) / (count * block)
     reach = np.ceil(half_width * (1.0 + 2.0 * SEARCH_RADII) + 4.0)
     t = np.arange(-reach, reach + 1.0)
-    strip = straighten(ground, curve, s, t).reshape(count, block, len(t)).mean(axis=1)
+    where, angle = curve.at(s)
+    straight = straightened(ground.grey, where - ground.origin_px, normals(angle), t)
+    strip = straight.reshape(count, block, len(t)).mean(axis=1)
     rise = gaussian_filter1d(strip, max(1.0, 0.04 * half_width), axis=1, order=1)
-    ok = np.isfinite(strip).all(axis=1)
-    usual = medians(rise, axis=0) if ok.all() else np.nanmedian(rise, axis=0)  # the latter takes ten times as long
-    middle = _offset(usual, t, half_width, tolerance)
+    ok = np.asarray(in_picture(ground, curve, s, reach).reshape(count, block).all(axis=1))
+    middle = _offset(medians(rise[ok], axis=0), t, half_width, tolerance)
     # The path wanders about the cable: look for the pair again along s, near the pair of the whole cable.
     sigma = SEARCH_RADII * half_width / 2.0 + 1.0
     edges = np.empty((count, 2))
@@ -134,7 +124,7 @@ def _offset(rise: Array, t: Array, half_width: float, tolerance: float) -> tuple
     off = 0.5 * (t[None, :] + t[:, None])
     prior = ((width / (2.0 * half_width) - 1.0) / tolerance) ** 2 + (off / (SEARCH_RADII * half_width)) ** 2
     pair = np.sqrt(np.maximum(-rise[:, None], 0.0) * np.maximum(rise[None, :], 0.0)) * np.exp(-0.5 * prior)
-    first, second = np.unravel_index(int(np.nanargmax(pair)), pair.shape)
+    first, second = np.unravel_index(int(np.argmax(pair)), pair.shape)
     return float(t[first]), float(t[second])
 
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Array
 from pipeline.vision.median import median
-from pipeline.vision.photo import sampled
+from pipeline.vision.photo import straightened
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
@@ -150,9 +150,8 @@ def _alike(standout: Standout, cut: CrossCut, width: float, usual: float) -> NDA
 def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
     """Step of each section by the brightness of its ground."""
     _, normal = path_normals(cut.path)
-    beside = cut.path[:, None, :] + np.array([-1.2, 1.2])[:, None] * width * normal[:, None, :]
-    ground = sampled(standout.picture, beside)
-    return np.asarray(cut.step / np.maximum(ground.reshape(len(cut.path), -1).mean(axis=1), _BEYOND_DARKEST))
+    ground = straightened(standout.picture, cut.path, normal, np.array([-1.2, 1.2]) * width).mean(axis=(1, 2))
+    return np.asarray(cut.step / np.maximum(ground, _BEYOND_DARKEST))
 
 
 def more_beyond(

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.vision.median import medians
-from pipeline.vision.photo import Photo, sampled
+from pipeline.vision.photo import Photo, straightened
 from pipeline.vision.search.backdrop import Image, Standout
 
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
@@ -61,7 +61,7 @@ def edge_spreads(grey: Image, middle: Array, across: Array, width: float) -> Arr
     plateau = max(2, len(offsets) // 6)
     spreads = np.zeros((2, _GROUPS))
     for side, edge in enumerate((-0.5 * width, 0.5 * width)):
-        profiles = sampled(grey, middle[:, None] + (edge + offsets)[:, None] * across[:, None])
+        profiles = straightened(grey, middle, across, edge + offsets)[..., 0]
         for k, group in enumerate(np.array_split(profiles, _GROUPS)):
             profile = medians(group, axis=0)
             height = abs(float(profile[-plateau:].mean() - profile[:plateau].mean()))

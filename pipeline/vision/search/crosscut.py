@@ -23,9 +23,9 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d, median_filter
 
 from pipeline.records import Array
 from pipeline.vision.median import median, medians
-from pipeline.vision.photo import sampled
+from pipeline.vision.photo import straightened
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.search.backdrop import Image, Standout
+from pipeline.vision.search.backdrop import Standout
 
 _SMOOTHING_WIDTHS = 0.8  # widths; smooths the skeleton's steps and shifts a bend of radius ten widths by 0.03
 _CORE = ((-0.35, 0.35),)  # widths from the middle
@@ -134,7 +134,8 @@ def cut_across(
     """
     path = smooth_path(path, _SMOOTHING_WIDTHS * width)
     _, normal = path_normals(path)
-    straight, offsets = straighten(standout.residual, path, normal, width)
+    offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
+    straight = straightened(standout.residual, path, normal, offsets)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
     grey = straight @ weights.astype(np.float32)
     relief = grey - medians(grey[:, _beside(offsets / width)], axis=1)[:, None]
@@ -164,8 +165,8 @@ def crossed_at(standout: Standout, cut: CrossCut) -> tuple[float, float] | None:
     """
     width, each = cut.usual_width, max(1, round(0.25 * cut.usual_width))
     offsets = np.linspace(-_ARM_WIDTHS, _ARM_WIDTHS, 59)
-    points = cut.path[:, None] + width * offsets[:, None] * path_normals(cut.path)[1][:, None]
-    grey = sampled(standout.residual, points).reshape(len(points), 59, -1) @ cut.weights.astype(np.float32)
+    straight = straightened(standout.residual, cut.path, path_normals(cut.path)[1], width * offsets)
+    grey = straight @ cut.weights.astype(np.float32)
     count = len(grey) // each
     if count <= 24:
         return None
@@ -196,13 +197,6 @@ def _level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks, *parts:
     reach = np.divide(parts, offsets[1] - offsets[0]) * flanks.width
     places = [(column + np.arange(int(first), int(last) + 1)).clip(0, len(offsets) - 1) for first, last in reach]
     return np.asarray(np.max([medians(np.take_along_axis(relief, place, axis=1), axis=1) for place in places], axis=0))
-
-
-def straighten(picture: Image, path: Array, normal: Array, width: float) -> tuple[Image, Array]:
-    """Picture ``(n, m, c)`` along a path (n, 2), and the offsets (m,) of its columns."""
-    offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
-    straight = sampled(picture, path[:, None] + normal[:, None] * offsets[:, None])
-    return straight.reshape(len(path), len(offsets), -1), offsets
 
 
 def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array) -> Array:

@@ -11,8 +11,9 @@ from scipy.stats import norm
 
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.edge_profile import Pixels, fit_edges, fit_profiles, profile
-from pipeline.vision.centerline.edges import Ground, in_picture, search_edges, straighten
+from pipeline.vision.centerline.edges import Ground, in_picture, normals, search_edges
 from pipeline.vision.centerline.midline import free_of_covers, measure_sections
+from pipeline.vision.photo import straightened
 
 BLUR, DARK, STEP = 0.9, 0.2, 0.6
 ACROSS = np.arange(-8.0, 7.0)
@@ -140,7 +141,9 @@ def test_straightened_strip_is_the_picture_along_the_path():
     ground = Ground((0.001 * u + 0.005 * v).astype(np.float32), (0, 0))
     s, t = np.linspace(50.0, 300.0, 7), np.array([-10.0, 0.0, 10.0])
     exact = 0.001 * (s[:, None] + 20.0) + 0.005 * (60.0 + t)
-    assert_allclose(straighten(ground, straight(), s, t), exact, atol=1e-4)  # remap rounds to 1/32 px, at 0.006 a px
+    where, angle = straight().at(s)
+    found = straightened(ground.grey, where, normals(angle), t)[..., 0]
+    assert_allclose(found, exact, atol=1e-4)  # remap rounds to 1/32 px, at 0.006 a px
 
 
 @pytest.mark.parametrize("above", [False, True])
