@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pipeline.messages import Message
 from pipeline.records import Array
 from pipeline.vision.median import median, scatter
-from pipeline.vision.photo import straightened
+from pipeline.vision.photo import Closeup, straightened
 from pipeline.vision.polyline import step_lengths
 
 _PER_WIDTH = 10  # columns of the straightened picture a width, one a px at least
@@ -98,33 +98,10 @@ class Evidence:
         return self.likeness >= _LEAST_LIKENESS and self.edges >= _SURE
 
 
-@dataclass(frozen=True)
-class Course:
-    """A strip on a picture.
-
-    Attributes
-    ----------
-    grey : (h, w)
-        Window of the photo, one grey value.
-    origin_px : (u, v) px
-        Photo pixel of ``grey[0, 0]``.
-    dark : bool
-        The strip is darker than its ground in ``grey``.
-    middle : (n, 2) px
-        Points about evenly along it, at most a quarter of its width apart or so.
-    across : (n, 2)
-        Unit vectors from its one edge to the other.
-    """
-
-    grey: NDArray[np.float32]
-    origin_px: tuple[int, int]
-    dark: bool
-    middle: Array
-    across: Array
-
-
 def weigh(
-    course: Course,
+    closeup: Closeup,
+    middle: Array,
+    across: Array,
     widths: Array,
     *,
     std: float,
@@ -136,7 +113,12 @@ def weigh(
 
     Parameters
     ----------
-    course : Course
+    closeup : Closeup
+        The picture.
+    middle : (n, 2) px
+        Points about evenly along the strip, at most a quarter of its width apart or so.
+    across : (n, 2)
+        Unit vectors from its one edge to the other.
     widths : (m,) px
         Of the strip along it.
     std : px
@@ -148,13 +130,12 @@ def weigh(
     grid : px
         Distance of values of the picture that tell something new.
     """
-    middle, width = course.middle, median(widths)
-    gap = median(step_lengths(middle))
+    width, gap = median(widths), median(step_lengths(middle))
     each = max(1, round(width / max(gap, 1e-9)))
     length = gap * (len(middle) - 1)
     if len(middle) < 4 * each:
         return Evidence(length)
-    picture, offset = _straightened(course, width)
+    picture, offset = _straightened(closeup, middle, across, width)
     blocks = _blocks(picture, each)
     reach = max(1, round(0.25 * width / (offset[1] - offset[0])))
     ground = _steps(blocks, offset, np.concatenate([np.array(_NULL), -np.array(_NULL)]) * width, reach)
@@ -169,12 +150,11 @@ def weigh(
     )
 
 
-def _straightened(course: Course, width: float) -> tuple[NDArray[np.float32], Array]:
-    """Grey ``(n, m)`` along the midline with the cable dark, and the offsets of its columns, px."""
+def _straightened(closeup: Closeup, middle: Array, across: Array, width: float) -> tuple[NDArray[np.float32], Array]:
+    """Grey ``(n, m)`` along the midline, and the offsets of its columns, px."""
     spacing = max(1.0, width / _PER_WIDTH)
     offset = np.arange(-np.ceil(2.1 * width / spacing), np.ceil(2.1 * width / spacing) + 1.0) * spacing
-    grey = straightened(course.grey, course.middle - course.origin_px, course.across, offset)[..., 0]
-    return grey if course.dark else -grey, offset
+    return straightened(closeup.grey, middle - closeup.origin_px, across, offset)[..., 0], offset
 
 
 def _blocks(picture: NDArray[np.float32], each: int) -> Array:

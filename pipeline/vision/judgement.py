@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful, inferred
 from pipeline.vision.bearings.covers import BearingHints, find_bearings, left_first
-from pipeline.vision.evidence import Course, weigh
+from pipeline.vision.evidence import weigh
 from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing, RoughCable
@@ -129,10 +129,10 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     share = len(cut.seen_widths) / len(cut.width)
     first, last = found.visible
     path = found.path_px[first : last + 1]
-    course = Course(found.grey, found.origin_px, found.dark, path, path_normals(path)[1])
     # a cell's edge is found to a fifth of it
     std, grid = 0.3 * standout.reduction, photo.grid_px
-    evidence = weigh(course, widths, std=std, share=share, crossed=crossed, grid=grid)
+    across = path_normals(path)[1]
+    evidence = weigh(found.closeup, path, across, widths, std=std, share=share, crossed=crossed, grid=grid)
     return replace(found, goes_on=more is not None, evidence=evidence, findings=told)
 
 

@@ -78,6 +78,14 @@ class Photo:
         return self.pixels.shape[1], self.pixels.shape[0]
 
 
+@dataclass(frozen=True)
+class Closeup:
+    """Window of a photo as one grey value, in which the cable is dark, and the photo pixel of its corner."""
+
+    grey: NDArray[np.float32]
+    origin_px: tuple[int, int]
+
+
 def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) -> Photo | Rejected:
     """Read one photo.
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array, Finding
 from pipeline.vision.evidence import Evidence
+from pipeline.vision.photo import Closeup
 from pipeline.vision.polyline import step_lengths
 
 AxisKind = Literal["cover", "given", "end", "clamp"]
@@ -103,6 +104,11 @@ class RoughCable:
     def axes(self) -> tuple[Bearing, Bearing]:
         """The left and the right bearing axis."""
         return self.left, self.right
+
+    @property
+    def closeup(self) -> Closeup:
+        """The window in which the cable is dark."""
+        return Closeup(self.grey if self.dark else -self.grey, self.origin_px)
 
     @property
     def length_px(self) -> float:

@@ -27,9 +27,9 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.records import Array
 from pipeline.vision.centerline.curvature import PlaneCurve
-from pipeline.vision.centerline.edge_profile import Float32, Pixels
+from pipeline.vision.centerline.edge_profile import Pixels
 from pipeline.vision.median import median, medians, scatter
-from pipeline.vision.photo import straightened
+from pipeline.vision.photo import Closeup, straightened
 from pipeline.vision.search.crosscut import steepest
 
 SEARCH_RADII = 0.35
@@ -40,26 +40,18 @@ false edge (highlight, text) is mostly farther.
 _TOGETHER = 2.0  # scatter of half the width over that of the middle; edges that err each by itself have 1
 
 
-@dataclass(frozen=True)
-class Ground:
-    """Picture in which the cable is dark, and the photo pixel of its corner."""
-
-    grey: Float32
-    origin_px: tuple[int, int]
-
-
 def normals(angle: Array) -> Array:
     """Unit normals ``(n, 2)``: direction of t."""
     return np.column_stack([-np.sin(angle), np.cos(angle)])
 
 
-def in_picture(ground: Ground, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:
+def in_picture(closeup: Closeup, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:
     """Mask (n,) of the sections whose pixels up to ``reach`` px on both sides are in the picture."""
     where, angle = curve.at(s)
-    height, width = ground.grey.shape
+    height, width = closeup.grey.shape
     inside = np.ones(len(s), dtype=bool)
     for side in (-reach, reach):
-        u, v = (where + side * normals(angle) - np.asarray(ground.origin_px)).T
+        u, v = (where + side * normals(angle) - np.asarray(closeup.origin_px)).T
         inside &= (u >= 1.0) & (u <= width - 2.0) & (v >= 1.0) & (v <= height - 2.0)
     return inside
 
@@ -85,7 +77,7 @@ class Found:
 
 
 def search_edges(
-    ground: Ground, curve: PlaneCurve, *, span: tuple[float, float], half_width: float, tolerance: float
+    closeup: Closeup, curve: PlaneCurve, *, span: tuple[float, float], half_width: float, tolerance: float
 ) -> Found:
     """Both edges on blocks along ``span``, to a few tenths of a pixel.
 
@@ -102,10 +94,10 @@ def search_edges(
     reach = np.ceil(half_width * (1.0 + 2.0 * SEARCH_RADII) + 4.0)
     t = np.arange(-reach, reach + 1.0)
     where, angle = curve.at(s)
-    straight = straightened(ground.grey, where - ground.origin_px, normals(angle), t)
+    straight = straightened(closeup.grey, where - closeup.origin_px, normals(angle), t)
     strip = straight.reshape(count, block, len(t)).mean(axis=1)
     rise = gaussian_filter1d(strip, max(1.0, 0.04 * half_width), axis=1, order=1)
-    ok = np.asarray(in_picture(ground, curve, s, reach).reshape(count, block).all(axis=1))
+    ok = np.asarray(in_picture(closeup, curve, s, reach).reshape(count, block).all(axis=1))
     middle = _offset(medians(rise[ok], axis=0), t, half_width, tolerance)
     # The path wanders about the cable: look for the pair again along s, near the pair of the whole cable.
     sigma = SEARCH_RADII * half_width / 2.0 + 1.0
@@ -129,7 +121,7 @@ def _offset(rise: Array, t: Array, half_width: float, tolerance: float) -> tuple
 
 
 def edge_pixels(
-    ground: Ground,
+    closeup: Closeup,
     curve: PlaneCurve,
     s: Array,
     *,
@@ -157,8 +149,8 @@ def edge_pixels(
         np.array([-1.0, 1.0])[:, None, None] * ((u - where[:, :1]) * across[:, :1] + (v - where[:, 1:]) * across[:, 1:])
         - expected
     )
-    height, width = ground.grey.shape
-    column = np.clip(u.astype(np.int64) - ground.origin_px[0], 0, width - 1)
-    row = np.clip(v.astype(np.int64) - ground.origin_px[1], 0, height - 1)
+    height, width = closeup.grey.shape
+    column = np.clip(u.astype(np.int64) - closeup.origin_px[0], 0, width - 1)
+    row = np.clip(v.astype(np.int64) - closeup.origin_px[1], 0, height - 1)
     shape = (2, len(s), rows * len(out))
-    return Pixels(offset.astype(np.float32).reshape(shape), ground.grey[row, column].reshape(shape), len(out))
+    return Pixels(offset.astype(np.float32).reshape(shape), closeup.grey[row, column].reshape(shape), len(out))

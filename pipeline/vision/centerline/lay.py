@@ -7,9 +7,7 @@ makes the curve too stiff to follow the cable. Its part faster than any bend of 
 
 ``cables followed on a series -> the same without the common wiggle, and fitted anew``
 
-What is slower than `_LONGEST_WIDTHS` is left alone, for a bend may do that: a kink or a soft spot is not touched. The
-distances are those from the curves, and of the curves that the wiggle had made too stiff something is left in them; so
-it is done twice.
+What is slower than `_LONGEST_WIDTHS` is left alone, for a bend may do that: a kink or a soft spot is not touched.
 """
 
 from __future__ import annotations
@@ -33,26 +31,18 @@ _LONGEST_WIDTHS, _ORDER = 5.6, 4
 one eight widths long all but a sixteenth. The order of the differences that tell slow from fast: no cubic is fast, also
 where the seen part of a cable ends. A running mean, one-sided there, moved the last two diameters by 0.3 px."""
 
-_PASSES = 2
-
 
 def without_lay(cables: Sequence[Followed | Rejected], diameter_m: float) -> tuple[Followed | Rejected, ...]:
     """Cables of a series without the fast wiggle that all photos have in common; a single one as it is."""
     first = [cable for cable in cables if isinstance(cable, Followed)]
     if len(first) < 2:
         return tuple(cables)
-    taken, now, std, spare = [np.zeros(len(cable.fit.s)) for cable in first], first, 0.0, 1.0
-    for _ in range(_PASSES):
-        places, used = [cable.from_axis for cable in now], [cable.fit.weight > 0.0 for cable in now]
-        at, across = (
-            [part[own] for part, own in zip(parts, used, strict=True)]
-            for parts in (places, [c.fit.residual for c in now])
-        )
-        seen = common_wiggle(at, across, diameter_m)
-        parts = zip(taken, places, at, seen.across, strict=True)
-        taken = [before + np.interp(s, own, wiggle) for before, s, own, wiggle in parts]
-        std, spare = max(std, seen.std), max(spare, seen.spare)
-        now = [cable.without(off, spare=spare, lay_std=std) for cable, off in zip(first, taken, strict=True)]
+    used = [cable.fit.weight > 0.0 for cable in first]
+    at = [cable.from_axis[own] for cable, own in zip(first, used, strict=True)]
+    across = [cable.fit.residual[own] for cable, own in zip(first, used, strict=True)]
+    seen = common_wiggle(at, across, diameter_m)
+    off = [np.interp(cable.from_axis, s, own) for cable, s, own in zip(first, at, seen.across, strict=True)]
+    now = [cable.without(own, spare=seen.spare, lay_std=seen.std) for cable, own in zip(first, off, strict=True)]
     rest = iter(now)
     return tuple(next(rest) if isinstance(cable, Followed) else cable for cable in cables)
 

@@ -37,8 +37,9 @@ from scipy.ndimage import binary_opening, maximum_filter1d, median_filter
 from pipeline.records import Array
 from pipeline.vision.centerline.curvature import PlaneCurve
 from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles, in_one_light
-from pipeline.vision.centerline.edges import Found, Ground, edge_pixels, normals
+from pipeline.vision.centerline.edges import Found, edge_pixels, normals
 from pipeline.vision.median import MAD_TO_STD, median, medians, quantile, scatter
+from pipeline.vision.photo import Closeup
 
 LEAST_SECTIONS = 12  # measured, or found in the search, at all; fewer do not fix a curve that bends both ways
 _WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
@@ -131,7 +132,7 @@ def free_of_covers(curve: PlaneCurve, s: Array, offset: float, covers: Array) ->
 
 
 def measure_sections(
-    ground: Ground,
+    closeup: Closeup,
     curve: PlaneCurve,
     s: Array,
     *,
@@ -151,7 +152,7 @@ def measure_sections(
     rows = max(1, int(median(np.diff(s))))
     waves = found is not None and found.swing > window[1] - EDGE_WINDOW_BLURS * blur
     outline = found.outline if found is not None and waves else lambda s: np.full((2, len(s)), half_width)
-    pixels = edge_pixels(ground, curve, s, rows=rows, outline=outline, window=window)
+    pixels = edge_pixels(closeup, curve, s, rows=rows, outline=outline, window=window)
     alike, zero, gain = in_one_light(pixels) if waves else (pixels, 0.0, 1.0)
     free, held = fit_profiles(alike, s, blur=max(blur, 0.5), thin=half_width < _SMALL_RADIUS_PX)
     profiles = held if held is not None and _serves(held, free, half_width, diameter) else free

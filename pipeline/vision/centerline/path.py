@@ -11,7 +11,6 @@ from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_poi
 from pipeline.vision.centerline.edges import (
     SEARCH_RADII,
     Found,
-    Ground,
     in_picture,
     normals,
     search_edges,
@@ -93,7 +92,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     blur : px
         Standard deviation of the edges' spread; measured if not given.
     """
-    ground = Ground(rough.grey if rough.dark else -rough.grey, rough.origin_px)
+    closeup = rough.closeup
     first, last = rough.visible
     along = arc_lengths(rough.path_px)
     if along[last] - along[first] < _LEAST_SEEN_RADII * half_width:
@@ -110,7 +109,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     if span is None:
         return _lost(rough, 0.0)
     tolerance = _WIDTH_TOLERANCE * (1.0 if known else 2.0)
-    found = search_edges(ground, path, span=span, half_width=half_width, tolerance=tolerance)
+    found = search_edges(closeup, path, span=span, half_width=half_width, tolerance=tolerance)
     width = found.edges[:, 1] - found.edges[:, 0]
     middle = median(width[found.usable]) if found.usable.any() else np.nan
     usable = found.usable & (np.abs(width - middle) < SEARCH_RADII * half_width)
@@ -122,7 +121,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     path = follow_points(edges.mean(axis=1)[usable], start=path, s=found.s[usable], order=_PENALTY_ORDER)
     where, angle = path.at(found.s)
     if blur is None:
-        blur = median(edge_spreads(rough.grey, where - ground.origin_px, normals(angle), middle))
+        blur = median(edge_spreads(rough.grey, where - closeup.origin_px, normals(angle), middle))
     found = Found(found.s, ((edges - where[:, None]) * normals(angle)[:, None]).sum(axis=2), usable)
     covers = _covers(rough, blur)
     count = round((span[1] - span[0]) / (_SECTION_SPACING_DIAMETERS * diameter))
@@ -130,12 +129,12 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     s = span[0] + (np.arange(count) + 0.5) * (span[1] - span[0]) / count
     s = s[
         free_of_covers(path, s, _COVER_CHECK_RADII * half_width, covers)
-        & in_picture(ground, path, s, 1.2 * half_width + 3.0 * blur + 4.0)
+        & in_picture(closeup, path, s, 1.2 * half_width + 3.0 * blur + 4.0)
     ]
     if len(s) < LEAST_SECTIONS:
         return _lost(rough, 0.0)
     stated = diameter if known else None
-    sections = measure_sections(ground, path, s, half_width=half_width, diameter=stated, blur=blur, found=found)
+    sections = measure_sections(closeup, path, s, half_width=half_width, diameter=stated, blur=blur, found=found)
     if sections is None:
         return _lost(rough, 0.0)
     softest = min(sections.softest, half_width / EDGE_WINDOW_BLURS)  # from there on one edge's window holds the other

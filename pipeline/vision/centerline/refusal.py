@@ -15,7 +15,7 @@ from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
-from pipeline.vision.evidence import Course, Evidence, unlike_a_cable, weigh
+from pipeline.vision.evidence import Evidence, unlike_a_cable, weigh
 from pipeline.vision.median import median, scatter
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import ChordFrame
@@ -37,9 +37,8 @@ def evidence_of(rough: RoughCable, sections: Sections) -> Evidence:
     """How much what was measured looks like a cable."""
     across = sections.second - sections.first
     across = across / (np.hypot(*across.T)[:, None] + 1e-12)
-    course = Course(rough.grey, rough.origin_px, rough.dark, 0.5 * (sections.first + sections.second), across)
-    std = 2.0 * median(sections.std)
-    return weigh(course, sections.width, std=std, share=sections.share, grid=rough.grid_px)
+    middle, std = 0.5 * (sections.first + sections.second), 2.0 * median(sections.std)
+    return weigh(rough.closeup, middle, across, sections.width, std=std, share=sections.share, grid=rough.grid_px)
 
 
 def refusal(

@@ -11,9 +11,9 @@ from scipy.stats import norm
 
 from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
 from pipeline.vision.centerline.edge_profile import Pixels, fit_edges, fit_profiles, profile
-from pipeline.vision.centerline.edges import Ground, in_picture, normals, search_edges
+from pipeline.vision.centerline.edges import in_picture, normals, search_edges
 from pipeline.vision.centerline.midline import free_of_covers, measure_sections
-from pipeline.vision.photo import straightened
+from pipeline.vision.photo import Closeup, straightened
 
 BLUR, DARK, STEP = 0.9, 0.2, 0.6
 ACROSS = np.arange(-8.0, 7.0)
@@ -118,14 +118,14 @@ def straight(length=400.0, v=60.0) -> PlaneCurve:
     return PlaneCurve(frame, np.zeros(frame.size - 2), np.array([frame.grid[frame.anchor] + 20.0, v]), 0.0)
 
 
-def strip_picture(*, half=24.0, middle=60.0, highlight=True) -> Ground:
+def strip_picture(*, half=24.0, middle=60.0, highlight=True) -> Closeup:
     """A dark cable along u with a highlight wider than either dark strip beside it, and lines on the ground."""
     v = np.arange(120.0)[:, None] * np.ones((1, 440))
     grey = np.where(np.abs(v - middle) < half, 0.2, 0.8)
     if highlight:
         grey = np.where(np.abs(v - middle + 4.0) < 10.0, 0.7, grey)
     grey = np.where((v == 18.0) | (v == 110.0), 0.1, grey)
-    return Ground(grey.astype(np.float32), (0, 0))
+    return Closeup(grey.astype(np.float32), (0, 0))
 
 
 @pytest.mark.parametrize("lead", [-6.0, 0.0, 6.0])
@@ -138,7 +138,7 @@ def test_search_finds_the_sheath_and_not_the_highlight(lead):
 
 def test_straightened_strip_is_the_picture_along_the_path():
     u, v = np.meshgrid(np.arange(440.0), np.arange(120.0))
-    ground = Ground((0.001 * u + 0.005 * v).astype(np.float32), (0, 0))
+    ground = Closeup((0.001 * u + 0.005 * v).astype(np.float32), (0, 0))
     s, t = np.linspace(50.0, 300.0, 7), np.array([-10.0, 0.0, 10.0])
     exact = 0.001 * (s[:, None] + 20.0) + 0.005 * (60.0 + t)
     where, angle = straight().at(s)
@@ -152,7 +152,7 @@ def test_a_jaw_that_goes_on_beside_one_edge_is_no_cable(above):
     ground = strip_picture(highlight=False)
     jaw = slice(10, 82) if above else slice(38, 110)
     ground.grey[jaw, :160] = 0.2
-    ground = Ground(cv2.GaussianBlur(ground.grey, (0, 0), 1.0), (0, 0))
+    ground = Closeup(cv2.GaussianBlur(ground.grey, (0, 0), 1.0), (0, 0))
     s = np.linspace(20.0, 390.0, 240)
     found = measure_sections(ground, straight(), s, half_width=24.0, diameter=48.0, blur=1.0)
     assert found.s[0] > 140.0 - 4.0  # the jaw ends 140 px along the path, blurred by 1 px

@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.vision.evidence import Course, unlike_a_cable, weigh
+from pipeline.vision.evidence import unlike_a_cable, weigh
+from pipeline.vision.photo import Closeup
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.crosscut import crossed_at, cut_across
 
@@ -13,14 +14,10 @@ from pipeline.vision.search.crosscut import crossed_at, cut_across
 def test_a_refusal_tells_only_what_was_weighed(widths_long, told):
     """A grey strip 20 px wide without edges; four widths of it are the least."""
     count = 4 * widths_long + 1
-    course = Course(
-        np.full((120, 60 + 5 * count), 0.5, np.float32),
-        (0, 0),
-        dark=True,
-        middle=np.column_stack([30.0 + 5.0 * np.arange(count), np.full(count, 60.0)]),
-        across=np.tile([0.0, 1.0], (count, 1)),
-    )
-    refused = unlike_a_cable(weigh(course, np.full(count, 20.0), std=0.1))
+    closeup = Closeup(np.full((120, 60 + 5 * count), 0.5, np.float32), (0, 0))
+    middle = np.column_stack([30.0 + 5.0 * np.arange(count), np.full(count, 60.0)])
+    across = np.tile([0.0, 1.0], (count, 1))
+    refused = unlike_a_cable(weigh(closeup, middle, across, np.full(count, 20.0), std=0.1))
     assert len(refused.values) == told
     assert all(np.isfinite(value) for value in refused.values.values())
 
