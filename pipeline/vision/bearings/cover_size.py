@@ -21,8 +21,7 @@ import numpy as np
 
 from pipeline.records import Array
 from pipeline.vision.bearings.covers import find_rim
-from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, Circle, Radius
-from pipeline.vision.bearings.rings import is_sure
+from pipeline.vision.bearings.rim import SAME_RADIUS, SEARCH_RADII, SURE_RIM, Circle, Radius
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
@@ -112,9 +111,8 @@ class _LostEnd:
         """Circle of about some radius that is a cover for sure."""
         expected = Radius(radius, 0.5 * SEARCH_RADII)
         circle = find_rim(self.photo, self.end, expected, self.width_px)
-        if circle is None or circle.radius_std > SAME_RADIUS * circle.radius:
-            return None
-        return circle if is_sure(self.photo, circle, circle.radius) else None
+        sure = circle is not None and circle.rim >= SURE_RIM and circle.radius_std <= SAME_RADIUS * circle.radius
+        return circle if sure else None
 
     def sizes(self) -> Array:
         """Radii tried."""

@@ -32,7 +32,7 @@ from pipeline.vision.bearings.rim import (
     Radius,
     fit_circle,
 )
-from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks, is_sure, with_rings
+from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks, with_rings
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import AxisKind, Bearing
@@ -112,7 +112,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     tries = (
         (along < 0.0, prior, 1.0, MIN_RIM),
         (along < 0.0, prior, _SOFT_RIM_PX, _MIN_SOFT_RIM),
-        (along < -np.inf, anywhere, 1.0, MIN_RIM),
+        (along < -np.inf, anywhere, 1.0, np.inf),
     )
     for blind, where, softness, least in tries:
         if softness > 1.0 and partial is not None:
@@ -121,9 +121,7 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
         found = _best_circle(photo, radius, window, votes, softness)
         if found is not None and found.rim >= SURE_RIM:
             return found
-        if found is None or found.rim < max(least, 0.0 if partial is None else partial.rim + 0.02):
-            continue
-        if where is prior or is_sure(photo, found, radius.px):
+        if found is not None and found.rim >= max(least, 0.0 if partial is None else partial.rim + 0.02):
             partial = found
     return partial
 

@@ -78,14 +78,6 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
     return Circle((float(middle[0]), float(middle[1])), expected.px, std, doubt, rim.rim, agree)
 
 
-def is_sure(photo: Photo, rim: Circle, radius: float) -> bool:
-    """Whether a rim is seen nearly all round, or what lies within it is a target: the same turned by half a turn.
-
-    On few pixels the end of a cable is that too.
-    """
-    return rim.rim >= SURE_RIM or (radius > MARK_CELLS and bool(_turned_half(photo, rim, radius)))
-
-
 def _turned_half(photo: Photo, rim: Circle, radius: float) -> list[Circle]:
     """The point about which what lies on a cover looks the same turned by half a turn; empty without such a point.
 
