@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, gaussian_filter1d
+from scipy.ndimage import gaussian_filter, gaussian_filter1d, map_coordinates
 from scipy.special import ndtr
 
 from pipeline.records import Array
@@ -272,9 +272,8 @@ def _spread(slopes: _Slopes, edge: Array) -> tuple[Array, Array, float]:
     found = np.isfinite(edge)
     t = np.arange(-_LIGHT_REACH_PX, _LIGHT_REACH_PX + 0.25, 0.5)
     places = (np.where(found, edge, 0.0)[:, None] + t - slopes.offsets[0]) / 0.5
-    low = np.clip(np.floor(places).astype(int), 0, len(slopes.offsets) - 2)
-    share, rows = np.clip(places - low, 0.0, 1.0), np.arange(len(edge))[:, None]
-    around = (1.0 - share) * slopes.along[rows, low] + share * slopes.along[rows, low + 1]
+    rows = np.broadcast_to(np.arange(len(edge))[:, None], places.shape)
+    around = np.asarray(map_coordinates(slopes.along, [rows, places], order=1, mode="nearest"), np.float64)
     mean = medians(around[found], axis=0)
     mass = np.clip(mean - np.min(mean), 0.0, None)
     inside = mass > 0.3 * mass.max()

@@ -102,9 +102,8 @@ def smooth_path(path: Array, sigma: float) -> Array:
     even = np.column_stack([np.interp(grid, s, path[:, 0]), np.interp(grid, s, path[:, 1])])
     pad = min(len(even) - 1, int(4 * sigma) + 1)
     # Odd reflection about the ends keeps position and direction there.
-    before = 2.0 * even[0] - even[pad:0:-1]
-    after = 2.0 * even[-1] - even[-2 : -pad - 2 : -1]
-    return np.asarray(gaussian_filter1d(np.vstack([before, even, after]), sigma, axis=0)[pad : pad + len(even)])
+    padded = np.pad(even, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
+    return np.asarray(gaussian_filter1d(padded, sigma, axis=0)[pad : pad + len(even)])
 
 
 def path_normals(path: Array) -> tuple[Array, Array]:
