@@ -30,11 +30,7 @@ def reduce_photo(photo: Photo, settings: PreviewSettings) -> Preview:
     """The photo at the size of a report's column, as JPEG; levels stretched to the range it uses."""
     factor = max(1.0, max(photo.size) / settings.long_side_px)
     size = (max(1, round(photo.size[0] / factor)), max(1, round(photo.size[1] / factor)))
-    small = reduce_area(photo.pixels, size)
-    if small.dtype == np.uint8:
-        shown = np.asarray(small, np.uint8)
-    else:
-        shown = np.clip(small.astype(np.float32) * np.float32(255.0 / photo.full_scale), 0, 255).astype(np.uint8)
+    shown = np.asarray(cv2.convertScaleAbs(reduce_area(photo.pixels, size), alpha=255.0 / photo.full_scale), np.uint8)
     return Preview(_jpeg(shown, settings), size[0], size[1], photo.size[0] / size[0])
 
 

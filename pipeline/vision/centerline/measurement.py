@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
@@ -292,13 +291,6 @@ def _with_axes(covariance: Array, axis_std: float, chord: float) -> Array:
     return whole
 
 
-def _seen(s: Array, measured: Array, reach: float) -> NDArray[np.bool_]:
-    """Arc lengths (n,) no farther than ``reach`` from a measured section, (m,) ascending or nearly so."""
-    measured = np.sort(measured)
-    after = np.clip(np.searchsorted(measured, s), 1, len(measured) - 1)
-    return np.asarray(np.minimum(np.abs(s - measured[after - 1]), np.abs(s - measured[after])) <= reach)
-
-
 def _shape(
     fit: CurveFit, s: Array, covariance: Array, light: tuple[float, float], waves: Waves, *, width: float
 ) -> MeasuredShape:
@@ -306,14 +298,15 @@ def _shape(
     where, theta = fit.curve.at(s)
     normal, turn, bend = fit.curve.bases(s)
     used = fit.weight > 0.0
-    gap = median(np.diff(fit.s))
+    # s is seen where a section was measured so near, or their usual distance
+    reach = max(median(np.diff(fit.s)), _HIDDEN_WIDTHS * width)
     return MeasuredShape(
         s=s - s[0],
         x=where[:, 0],
         y=where[:, 1],
         theta=theta,
         kappa=-fit.curve.curvature(s),
-        seen=_seen(s, fit.s[used], max(gap, _HIDDEN_WIDTHS * width)),
+        seen=np.abs(np.subtract.outer(s, fit.s[used])).min(axis=1) <= reach,
         basis_normal=normal,
         basis_theta=turn,
         basis_kappa=-bend,

@@ -49,16 +49,15 @@ def on_one_side(
     bows = [(line.image, _bow(line)) for line in turned if _bow(line) > _OTHER_SIDE_WIDTHS * diameter_m]
     findings = tuple(said_once((image, inferred("photo/other-side", bow_m=bow)) for image, bow in bows))
     return tuple(
-        _turned(line) if isinstance(line, Centerline) and line.image in names else line for line in lines
+        replace(line, shape=reflected(line.shape), mirrored=not line.mirrored)
+        if isinstance(line, Centerline) and line.image in names
+        else line
+        for line in lines
     ), findings
 
 
 def _bow(line: Centerline) -> float:
     return float(np.max(np.abs(line.shape.y)))
-
-
-def _turned(line: Centerline) -> Centerline:
-    return replace(line, shape=reflected(line.shape), mirrored=not line.mirrored)
 
 
 def reflected(shape: MeasuredShape) -> MeasuredShape:

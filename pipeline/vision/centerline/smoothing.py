@@ -93,10 +93,9 @@ class _Diagonal:
         Squared length of the data.
     count, null : int
         Number of data, dimension of what is not penalised.
-    noise_log_det : float
-        Of the correlation matrix.
-    frame_log_det : float
-        Of the normal matrix in the frame of q less that in these coordinates: it changes with the correlation length.
+    log_det : float
+        Of the correlation matrix, and of the normal matrix in the frame of q less that in these coordinates: both
+        change with the correlation length.
     least : float
         Squared length of the penalised quantity below which the penalty is not believed, in units of the data.
     """
@@ -109,8 +108,7 @@ class _Diagonal:
     total: float
     count: int
     null: int
-    noise_log_det: float
-    frame_log_det: float
+    log_det: float
     least: float
 
     @cached_property
@@ -139,7 +137,7 @@ class _Diagonal:
         # A weight that leaves less than ``least``: its prior, with rank terms of variance sigma^2 / weight each.
         believed = weights * self.least <= rank * sigma2
         believed[0] = True
-        return np.where(believed, value + self.noise_log_det + self.frame_log_det, np.inf), sigma2
+        return np.where(believed, value + self.log_det, np.inf), sigma2
 
 
 def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float, least: float) -> _Diagonal:
@@ -165,9 +163,9 @@ def _diagonal(whitened: Array, penalty: Array, null: int, noise_log_det: float, 
         total=float(data @ data),
         count=len(whitened),
         null=null,
-        noise_log_det=noise_log_det,
         # weights count from gain^2, so the penalty's own determinant is told in that unit
-        frame_log_det=float(2.0 * np.log(np.abs(np.diag(r0)) * length).sum() - 2.0 * (size - null) * np.log(gain)),
+        log_det=noise_log_det
+        + float(2.0 * np.log(np.abs(np.diag(r0)) * length).sum() - 2.0 * (size - null) * np.log(gain)),
         least=float(gain**2 * least),
     )
 

@@ -11,6 +11,7 @@ the tilt.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -106,7 +107,7 @@ def _read_views(folder: Path, board: Board, settings: VisionSettings) -> tuple[l
 
 def find_board(photo: Photo, board: Board) -> BoardView | Rejected:
     """Corners of the board on a photo, sub-pixel; rejected with ``calibration/no-corners`` if it is not there."""
-    grey = _grey8(photo)
+    grey = cv2.convertScaleAbs(_grey(photo), alpha=255.0 / photo.full_scale)
     factor = max(1, round(max(photo.size) / _BOARD_SEARCH_PX))
     reduced = cv2.resize(grey, None, fx=1.0 / factor, fy=1.0 / factor, interpolation=cv2.INTER_AREA)
     small = np.asarray(reduced, np.uint8)
@@ -133,25 +134,20 @@ def _tells_plane(points: Array, board: Board) -> bool:
 
 def _refined(photo: Photo, board: Board, points: Array, uv: Array) -> Array:
     """Corners ``(n, 2)`` fitted to the photo at its full size and depth, NaN where it shows none."""
-    pixels = photo.pixels if photo.channels == 1 else cv2.cvtColor(photo.pixels, cv2.COLOR_BGR2GRAY)
     middle, size = uv.mean(axis=0), float(np.ptp(uv))
     to_picture = np.asarray(np.linalg.inv(homography_of((uv - middle) / size, points)), np.float64)
     half = 0.5 * board.square_m * np.eye(2)
     cells = [size * (project(to_picture, points + step) - project(to_picture, points - step)) for step in half]
     marker_share = _marker_m(board) / board.square_m if board.charuco else 0.0
-    return refine_corners(np.asarray(pixels), uv, np.stack(cells, axis=-1), marker_share)
+    return refine_corners(_grey(photo), uv, np.stack(cells, axis=-1), marker_share)
 
 
 def _marker_m(board: Board) -> float:
     return 0.75 * board.square_m if board.marker_m is None else board.marker_m
 
 
-def _grey8(photo: Photo) -> NDArray[np.uint8]:
-    pixels = photo.pixels if photo.channels == 1 else cv2.cvtColor(photo.pixels, cv2.COLOR_BGR2GRAY)
-    if pixels.dtype == np.uint8:
-        return np.asarray(pixels, np.uint8)
-    levels: NDArray[np.uint8] = np.clip(pixels * (255.0 / photo.full_scale), 0, 255).astype(np.uint8)
-    return levels
+def _grey(photo: Photo) -> NDArray[Any]:
+    return photo.pixels if photo.channels == 1 else np.asarray(cv2.cvtColor(photo.pixels, cv2.COLOR_BGR2GRAY))
 
 
 def _chessboard(grey: NDArray[np.uint8], board: Board) -> tuple[Array, Array] | None:
