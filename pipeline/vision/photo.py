@@ -167,8 +167,10 @@ def straightened(
 
 def values_at(photo: Photo, points: NDArray[np.floating]) -> NDArray[np.float32]:
     """Values ``(..., c)`` of a photo at points ``(..., 2)`` px as `sampled`, 0 black to 1 white."""
-    low = np.clip(np.floor(points.reshape(-1, 2).min(axis=0)).astype(int) - 1, 0, np.subtract(photo.size, 1))
-    high = np.clip(np.ceil(points.reshape(-1, 2).max(axis=0)).astype(int) + 2, low + 1, photo.size)
+    # each coordinate by itself: along pairs a minimum takes ten times as long
+    first, last = ([extreme(points[..., k]) for k in (0, 1)] for extreme in (np.min, np.max))
+    low = np.clip(np.floor(first).astype(int) - 1, 0, np.subtract(photo.size, 1))
+    high = np.clip(np.ceil(last).astype(int) + 2, low + 1, photo.size)
     part = photo.pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) / np.float32(photo.full_scale)
     return sampled(part, points - low).reshape(*points.shape[:-1], -1)
 
