@@ -84,7 +84,8 @@ def find_cable(
 
 def _find_near(photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCable | Rejected:
     """Find the cable where a neighbour photo lets it be expected, then anywhere."""
-    cable = replace(cable, bearings=replace(cable.bearings, sought=[]))
+    seen = () if near is None else near.axes
+    cable = replace(cable, bearings=replace(cable.bearings, seen=seen, sought=[]))
     if cable.path_px:
         return _along_clicks(photo, cable)
     if near is not None and cable.region is None:

@@ -41,6 +41,10 @@ from pipeline.vision.search.ends import CableEnd
 
 _RING_WIDTH = 0.05  # radii; std of the ring that seeks centres: as well as the radius is known
 _MARK_RADII = 0.95  # radii of a cover; largest dot, screw, bevel or bright middle that marks the axis of one not seen
+_SEEN_REACH_RADII = 2.5
+"""Radii; the cover of a neighbouring photo is this one's too if the cable's end is so near: the stub beyond a cover or
+a shadow beside it lead an end astray by two.
+"""
 _SOFT_RIM_PX = 2.5  # px; blur of a rim that is sought where no sharp one is seen: focus lost, or 3 % noise
 _MIN_SOFT_RIM = 0.5
 """Share of the rim where it is sought as a soft one: neighbouring directions share more, so chance gives more; focus
@@ -213,6 +217,8 @@ class BearingHints:
         Their diameter in diameters of the cable, where the scale is not known.
     given_px : pair of (u, v) or None
         Axes by the user.
+    seen : tuple of Bearing
+        Axes on a neighbouring photo.
     sought : list
         Where strips end on this photo, and the cover found there or not.
     """
@@ -220,6 +226,7 @@ class BearingHints:
     cover_px: float | None = None
     cover_widths: float | None = None
     given_px: PixelPair | None = None
+    seen: tuple[Bearing, ...] = ()
     sought: list[tuple[Array, Circle | None]] = field(default_factory=list, compare=False)
 
     def cover_radius(self, width_px: float) -> float | None:
@@ -248,10 +255,23 @@ def find_bearings(
         if not alike:
             alike = [find_cover(photo, end, expected, width_px)]
             hints.sought.append((known, alike[0]))
-        if alike[0] is None:
+        circle = alike[0]
+        if circle is None or not circle.sure:
+            circle = _where_seen(photo, end, hints.seen, expected) or circle
+        if circle is None:
             break  # one is not enough, whatever the other would be
-        axes[k] = alike[0].as_bearing()
+        axes[k] = circle.as_bearing()
     return axes[0], axes[1]
+
+
+def _where_seen(photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], expected: Radius) -> Circle | None:
+    """The cover of a neighbouring photo, all round in its place, near an end that was led astray beyond it."""
+    for cover in seen:
+        if np.hypot(*np.subtract(cover.center_px, end.place)) <= _SEEN_REACH_RADII * expected.px:
+            circle = fit_circle(photo, np.array(cover.center_px), expected)
+            if circle is not None and circle.rim >= SURE_RIM:
+                return with_rings(photo, circle, expected)
+    return None
 
 
 def _assign_given(ends: tuple[CableEnd, CableEnd], given: PixelPair) -> tuple[Bearing, Bearing]:

@@ -326,6 +326,18 @@ def test_cover_hardly_off_the_ground_is_found_by_its_dot(seed):
     assert circle.center == pytest.approx(center, abs=0.1)
 
 
+def test_a_cover_that_a_neighbour_photo_shows_is_found_though_the_cable_s_end_was_led_astray():
+    """Along a shadow that passes beside the cover the mask runs on beyond it."""
+    lefts, right, radius = [(90.4, 120.7)], (610.3, 90.6), 36.0
+    photo = painted_covers(lefts, right, radius, disc_grey=60.0)[0]
+    shadow = CableEnd(np.array([right[0] + 1.1 * radius, right[1] - 1.3 * radius]), np.array([1.0, 0.0]))
+    ends = shadow, CableEnd(np.array([lefts[0][0] + radius, lefts[0][1]]), np.array([-1.0, 0.0]))
+    assert find_bearings(photo, ends, 28.0, BearingHints(cover_px=2.0 * radius))[0] is None
+    near = (Bearing((89.0, 121.0), 0.03, radius), Bearing((610.0, 90.5), 0.03, radius))
+    found = find_bearings(photo, ends, 28.0, BearingHints(cover_px=2.0 * radius, seen=near))[0]
+    assert found is not None and found.center_px == pytest.approx(right, abs=0.1)
+
+
 @pytest.mark.parametrize(("std_px", "astray"), [(0.5, ()), (0.05, (3,))])
 def test_a_cover_that_is_off_by_its_own_error_stands_still(std_px: float, astray: tuple[int, ...]) -> None:
     """On pictures of few pixels a cover is found to half a pixel, more than the play of a rig."""
