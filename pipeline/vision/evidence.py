@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.messages import Message
 from pipeline.records import Array
@@ -135,9 +134,13 @@ def weigh(
     length = gap * (len(middle) - 1)
     if len(middle) < 4 * each:
         return Evidence(length)
-    picture, offset = _straightened(closeup, middle, across, width)
-    blocks = _blocks(picture, each)
-    reach = max(1, round(0.25 * width / (offset[1] - offset[0])))
+    spacing = max(1.0, width / _PER_WIDTH)
+    columns = np.ceil(2.1 * width / spacing)
+    offset = np.arange(-columns, columns + 1.0) * spacing
+    picture = straightened(closeup.grey, middle - closeup.origin_px, across, offset)
+    count = len(picture) // each
+    blocks = picture[: count * each].reshape(count, each, -1).mean(axis=1, dtype=np.float64)
+    reach = max(1, round(0.25 * width / spacing))
     ground = _steps(blocks, offset, np.concatenate([np.array(_NULL), -np.array(_NULL)]) * width, reach)
     noise = float(np.hypot(scatter(ground - np.median(ground, axis=0), 0.0), _LEVEL))
     weaker = np.min(_steps(blocks, offset, np.array([-0.5, 0.5]) * width, reach), axis=1) / noise
@@ -148,19 +151,6 @@ def weigh(
         unsteady=_unsteady(widths, width, std, grid),
         crossed=crossed,
     )
-
-
-def _straightened(closeup: Closeup, middle: Array, across: Array, width: float) -> tuple[NDArray[np.float32], Array]:
-    """Grey ``(n, m)`` along the midline, and the offsets of its columns, px."""
-    spacing = max(1.0, width / _PER_WIDTH)
-    offset = np.arange(-np.ceil(2.1 * width / spacing), np.ceil(2.1 * width / spacing) + 1.0) * spacing
-    return straightened(closeup.grey, middle - closeup.origin_px, across, offset)[..., 0], offset
-
-
-def _blocks(picture: NDArray[np.float32], each: int) -> Array:
-    """Means over ``each`` neighbouring rows."""
-    count = len(picture) // each
-    return np.asarray(picture[: count * each].reshape(count, each, -1).mean(axis=1), np.float64)
 
 
 def _steps(blocks: Array, offset: Array, places: Array, reach: int) -> Array:
