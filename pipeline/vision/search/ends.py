@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.stats import theilslopes
 
 from pipeline.records import Array
@@ -223,9 +224,8 @@ def _led_on_to(path: Array, axis: Bearing, width: float, trimmed: float) -> tupl
     there, slope = path[0], (path[0] - axis.center_px) / ahead
     if covered:
         there, slope = np.polynomial.polynomial.polyfit(s[near] - led, path[near], 2)[:2]
-    reach, chord = ahead + led, (there - axis.center_px) / (ahead + led)
-    third = 0.5 * (slope - chord) / reach**2
+    ends = np.array([axis.center_px, there])
+    bridge = CubicSpline([0.0, ahead + led], ends, bc_type=((2, np.zeros(2)), (1, slope)))
     count = max(1, int(ahead / median(np.diff(s))))
-    x = np.concatenate([np.arange(count) * (ahead / count), ahead + s[s < led]])[:, None]
-    lead = axis.center_px + (chord - third * reach**2) * x + third * x**3
+    lead = bridge(np.concatenate([np.arange(count) * (ahead / count), ahead + s[s < led]]))
     return np.vstack([lead[count:], path[len(lead) - count :]]), lead[:count]

@@ -10,6 +10,7 @@ from pipeline.vision.centerline.measurement import Followed, follow_cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
+from pipeline.vision.search.ends import without_specks
 from pipeline.vision.segmentation import find_cable
 
 
@@ -28,3 +29,11 @@ def test_a_cut_end_is_as_sure_as_its_edge(slant: float) -> None:
     for axis, place in ((followed.rough.left, first), (followed.rough.right, last)):
         assert axis.std_px < 0.5
         assert np.hypot(*np.subtract(axis.center_px, (place, 100.3))) < 2.0 * axis.std_px
+
+
+def test_what_is_no_longer_than_the_gap_that_parts_it_from_a_strip_is_none_of_it() -> None:
+    """A screw on a cover looks like the cable that ends before it; beyond a letter it is the cable that goes on."""
+    seen = np.zeros(120, bool)
+    seen[10:60] = seen[64:90] = seen[100:103] = True
+    assert without_specks(seen) == slice(10, 90)
+    assert without_specks(seen[::-1]) == slice(30, 110)
