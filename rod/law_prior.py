@@ -6,13 +6,15 @@ form is one of
 
     rough   exp(-(1 / 2 tau^2) int (g2^2 + (g1 / R)^2) dt)         R = `REACH`
     smooth  exp(-(1 / 2 tau^2) int (g3^2 + g2^2 + g1^2) dt)
+    quick   rough, and in one third of the abscissa freer by a factor `FREER`
 
 with tau of `TAUS`, times exp(-(dg/dxi(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides
 of rest. They are proper but for the level, so K0 and the stiffness at rest cannot run away together. Laws that fall
 smoothly are known twice as well with the smooth ones; knees and plateaus are followed by the rough ones alone; laws
-that change most just beside rest, where covers hide the cable, by those over the logarithm. Nothing is chosen: the
-posterior is the average over all of them and over all tau, each normalised and weighted by its evidence (Laplace), and
-the bands hold what the data leave open.
+that change most just beside rest, where covers hide the cable, by those over the logarithm; laws that change at one
+place and hardly elsewhere, as where wires begin to slip, by the quick ones, which need not let the rest be as rough.
+Nothing is chosen: the posterior is the average over all of them and over all tau, each normalised and weighted by its
+evidence (Laplace), half of the weight beforehand with the quick ones, and the bands hold what the data leave open.
 
 Both ways to the characteristic read the law through this module; nothing else do they share.
 """
@@ -21,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +43,18 @@ such as were set and are steepest there."""
 NEAR_REST = 0.02
 """Of the abscissa: nearer to rest its logarithm is a straight line. So much lies under the covers of most photos."""
 
+QUICK = 1.0 / 3.0
+"""Of the abscissa: as much as a sudden change of the law is spread over (`rod.compliance_law`)."""
+
+FREER = 5.0
+"""How much faster a quick law may change there: as large as a knee is beside what goes on along the rest of a law."""
+
+PLACES = 8
+"""Of the third, over the abscissa: no change is farther from the middle of one than a seventh of it."""
+
+Forms = Literal["rough", "even", "all"]
+"""Rough laws; these and the smooth ones, which change alike everywhere; and the quick ones as well."""
+
 TAUS = np.geomspace(0.05, 300.0, 12)
 """From laws of one stiffness to such as change it a hundredfold within a tenth of the range, a factor of two apart,
 over which the posterior hardly changes."""
@@ -54,7 +68,7 @@ class Family:
     ----------
     form, fixed : (p, p)
     log_norms : (t,)
-        Logarithms of the densities' norms, the level left out.
+        Logarithms of the densities' norms, the level left out, and of their share beforehand beside other families.
     """
 
     form: Array
@@ -62,18 +76,18 @@ class Family:
     log_norms: Array
 
 
-def family(form: Array, fixed: Array) -> Family:
-    """Family with its norms."""
+def family(form: Array, fixed: Array, share: float = 1.0) -> Family:
+    """Family with its norms and its share."""
     precisions = form / TAUS[:, None, None] ** 2 + fixed
     # B-splines of equal coefficients are the level, which has no prior: one as large as the others, taken out again
     size, scale = len(form), np.trace(precisions, axis1=1, axis2=2)
     held = precisions + scale[:, None, None] * np.full((size, size), 1.0 / size)
-    return Family(form, fixed, 0.5 * (np.linalg.slogdet(held)[1] - np.log(scale)))
+    return Family(form, fixed, np.log(share) + 0.5 * (np.linalg.slogdet(held)[1] - np.log(scale)))
 
 
-def integrals(spline: BSpline, rest: float | None = None) -> list[Array]:
+def integrals(spline: BSpline, rest: float | None = None, within: tuple[float, float] = (0.0, 1.0)) -> list[Array]:
     """Integrals (p, p) of g1^2, g2^2, g3^2 over the abscissa of the splines, or over its logarithm from `rest` on."""
-    edges = np.unique(spline.t if rest is None else np.append(spline.t, rest))
+    edges = np.unique(np.clip(spline.t if rest is None else np.append(spline.t, rest), *within))
     nodes, weights = np.polynomial.legendre.leggauss(6)  # exact along xi, to 1e-3 along its logarithm
     half = 0.5 * np.diff(edges)[:, None]
     at, weight = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
@@ -92,22 +106,33 @@ def integrals(spline: BSpline, rest: float | None = None) -> list[Array]:
 
 
 @lru_cache(maxsize=64)
-def _families(size: int, rest: float, *, smooth: bool) -> tuple[Family, ...]:
+def _families(size: int, rest: float, forms: Forms) -> tuple[Family, ...]:
     """Priors of `size` coefficients, rest at the abscissa `rest`."""
     spline = splines(size)
     rise = np.asarray(spline(rest, 1))
     squares = [integrals(spline), integrals(spline, rest)]
-    forms = [[g2 + g1 / REACH**2, g3 + g2 + g1][: 1 + smooth] for g1, g2, g3 in squares]  # rough, smooth
+    kinds = [[_rough(square), square[2] + square[1] + square[0]][: 1 if forms == "rough" else 2] for square in squares]
     slopes = [np.outer(rise, rise) / slope**2 for slope in REST_SLOPES]
-    return tuple(family(form, slope) for over in forms for slope in slopes for form in over)
+    even = tuple(family(form, slope) for over in kinds for slope in slopes for form in over)
+    if forms != "all":
+        return even
+    begins = np.linspace(0.0, 1.0 - QUICK, PLACES)
+    freed = [_rough(integrals(spline, within=(begin, begin + QUICK))) for begin in begins]
+    share = len(even) / (len(freed) * len(slopes))
+    free = 1.0 - FREER**-2
+    return even + tuple(family(kinds[0][0] - free * own, slope, share) for own in freed for slope in slopes)
 
 
-def priors(basis: LawBasis, *, smooth: bool = True) -> tuple[Family, ...]:
-    """All priors of a law's form, or those of rough laws alone.
+def _rough(squares: list[Array]) -> Array:
+    return squares[1] + squares[0] / REACH**2
+
+
+def priors(basis: LawBasis, forms: Forms = "all") -> tuple[Family, ...]:
+    """The priors of a law's form.
 
     With few data or much noise a smooth law is always the likeliest; a fit that is on its way takes the rough ones.
     """
-    return _families(basis.size, float(basis.xi[2 * basis.rest]), smooth=smooth)
+    return _families(basis.size, float(basis.xi[2 * basis.rest]), forms)
 
 
 @dataclass(frozen=True, eq=False)

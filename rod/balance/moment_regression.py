@@ -18,7 +18,7 @@ from scipy.special import chdtrc
 
 from rod.balance.moment_points import CommonErrors, MomentPoints, Residual, residual
 from rod.compliance_law import ComplianceLaw, LawBasis, refreshed
-from rod.law_prior import Posterior, averaged, priors
+from rod.law_prior import Forms, Posterior, averaged, priors
 
 Array = NDArray[np.float64]
 
@@ -114,7 +114,7 @@ class MomentModel:
         columns[:, self.common] *= np.array(self.common_std)
         return columns
 
-    def posterior(self, unknowns: Array, value: Array, J: Array, *, smooth: bool = True) -> Posterior:
+    def posterior(self, unknowns: Array, value: Array, J: Array, forms: Forms = "all") -> Posterior:
         """Mean and covariance of the unknowns, averaged over the priors with their evidence as the weight."""
         known = np.zeros(J.shape[1])
         known[self.common] = 1.0
@@ -122,7 +122,7 @@ class MomentModel:
             known[self.common.stop :] = 1e6 * max(d.length for d in self.data)
         rows = np.diag(known)[known > 0.0]
         value, J = np.concatenate([value, rows @ unknowns]), np.vstack([J, rows])
-        return averaged(value, J, unknowns, priors(self.basis, smooth=smooth))
+        return averaged(value, J, unknowns, priors(self.basis, forms))
 
 
 def bow_terms(data: MomentPoints) -> Array:
@@ -134,7 +134,7 @@ def bow_terms(data: MomentPoints) -> Array:
 def regress(model: MomentModel, *, pre_curvature: float) -> Regression | None:
     """Fit by Gauss-Newton from a straight line of compliance; None if it does not converge."""
     unknowns = np.concatenate([np.zeros(model.size), [pre_curvature], np.zeros(len(model.common_std) + BOW_TERMS)])
-    found = _settled(model, unknowns, smooth=False)
+    found = _settled(model, unknowns, "rough")
     for laid in range(LAYINGS):
         if found is None:
             return None
@@ -142,16 +142,16 @@ def regress(model: MomentModel, *, pre_curvature: float) -> Regression | None:
         known = found.posterior.covariance[: model.size, : model.size]
         basis = refreshed(found.curve, known, float(met.min()), float(met.max()))
         unknowns = np.concatenate([basis.projected(found.curve), found.unknowns[model.size :]])
-        found = _settled(replace(model, basis=basis), unknowns, smooth=laid == LAYINGS - 1)
+        found = _settled(replace(model, basis=basis), unknowns, "all" if laid == LAYINGS - 1 else "rough")
     return found
 
 
-def _settled(model: MomentModel, unknowns: Array, *, smooth: bool) -> Regression | None:
-    """Gauss-Newton from given unknowns; see `rod.law_prior.priors` for `smooth`."""
+def _settled(model: MomentModel, unknowns: Array, forms: Forms) -> Regression | None:
+    """Gauss-Newton from given unknowns; see `rod.law_prior.priors` for `forms`."""
     p = model.size
     for count in range(ITERATIONS):
         rows, value, J = model.linearised(unknowns)
-        posterior = model.posterior(unknowns, value, J, smooth=smooth)
+        posterior = model.posterior(unknowns, value, J, forms)
         move = posterior.mean - unknowns
         std = np.sqrt(np.maximum(np.diag(posterior.covariance), 0.0))
         # A fiftieth of a standard deviation is nothing anyone could see.

@@ -107,7 +107,7 @@ class AnyLaw:
 
     @cached_property
     def _prior(self) -> Array:
-        rough = priors(self.basis)[0]
+        rough = priors(self.basis, "rough")[0]
         slope = self.basis.spline(self.basis.xi[2 * self.basis.rest], 1) / REST_SLOPE
         weight, mode = np.linalg.eigh(rough.form / ROUGHNESS**2 + np.outer(slope, slope))
         kept = weight > 1e-9 * weight[-1]  # the level has no prior
@@ -115,8 +115,8 @@ class AnyLaw:
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """All families of `rod.law_prior`."""
-        return priors(self.basis)
+        """Laws that change alike everywhere: quick ones would triple the work, and are the same for all causes."""
+        return priors(self.basis, "even")
 
     def softening(self, unknowns: Array) -> tuple[float, Array]:
         """How far log f falls from rest to the largest bend, less `SOFTER`, over its spread; and its derivative."""

@@ -7,7 +7,7 @@ from scipy.special import erf
 
 from rod.compliance_law import COEFFICIENTS, moment_basis, refreshed, splines
 from rod.inverse.laws import over_moments
-from rod.law_prior import NEAR_REST, REACH, REST_SLOPES, TAUS, Posterior, averaged, priors
+from rod.law_prior import FREER, NEAR_REST, PLACES, QUICK, REACH, REST_SLOPES, TAUS, Posterior, averaged, priors
 from rod.measured_law import propagated
 from rod.stiffness_law import StiffnessLaw
 
@@ -103,25 +103,53 @@ def test_priors_are_the_integrals_of_the_module():
     cube, line = (np.linalg.lstsq(splines(basis.size)(t), t**n, rcond=None)[0] for n in (3, 1))
     rough, smooth = 36.0 / 3.0 + 9.0 / 5.0 / REACH**2, 36.0 + 36.0 / 3.0 + 9.0 / 5.0
     along, slopes = 2, len(REST_SLOPES)
-    told = quadratic(priors(basis), cube).reshape(along, slopes, 2, TAUS.size)
+    told = quadratic(priors(basis, "even"), cube).reshape(along, slopes, 2, TAUS.size)
     assert np.allclose(told[0], np.outer([rough, smooth], TAUS**-2.0), rtol=1e-8)
-    told = quadratic(priors(basis), line).reshape(along, slopes, 2, TAUS.size)
+    told = quadratic(priors(basis, "even"), line).reshape(along, slopes, 2, TAUS.size)
     exact = np.outer([1 / REACH**2, 1.0], TAUS**-2.0) + np.array(REST_SLOPES)[:, None, None] ** -2
     assert np.allclose(told[0], exact, rtol=1e-6)  # third derivatives of lines are differences of large numbers
-    assert np.allclose(quadratic(priors(basis, smooth=False), cube), quadratic(priors(basis), cube)[::2])
+    assert np.allclose(quadratic(priors(basis, "rough"), cube), quadratic(priors(basis, "even"), cube)[::2])
     many = moment_basis(0.0, 0.05, unit=60.0, size=80)
     logarithm = np.log1p(t / NEAR_REST) / np.log1p(1.0 / NEAR_REST)
     a = np.linalg.lstsq(splines(80)(t), logarithm, rcond=None)[0]
     at_rest = float(splines(80)(0.0, 1) @ a)
-    told = quadratic(priors(many), a).reshape(along, slopes, 2, TAUS.size)[1, 0, 0] - (at_rest / REST_SLOPES[0]) ** 2
+    told = (
+        quadratic(priors(many, "even"), a).reshape(along, slopes, 2, TAUS.size)[1, 0, 0]
+        - (at_rest / REST_SLOPES[0]) ** 2
+    )
     assert np.allclose(told, TAUS**-2.0 / REACH**2, rtol=0.005)
     for one in priors(basis):
         assert np.allclose((one.form + one.fixed) @ np.ones(basis.size), 0.0, atol=1e-9 * one.form.max())
 
 
+def test_quick_laws_are_freer_in_one_third():
+    """Of t^2, rest at t = 0: g1 = 2 t, g2 = 2, integrated over each third and over the rest."""
+    basis = moment_basis(0.0, 0.05, unit=60.0)
+    t = np.linspace(0.0, 1.0, 400)
+    square = np.linalg.lstsq(splines(basis.size)(t), t**2, rcond=None)[0]
+    even, every = priors(basis, "even"), priors(basis)
+    quick = every[len(even) :]
+    assert len(quick) == PLACES * len(REST_SLOPES)
+    begin = np.repeat(np.linspace(0.0, 1.0 - QUICK, PLACES), len(REST_SLOPES))
+    whole, third = (
+        4.0 * (high - low) + 4.0 / 3.0 * (high**3 - low**3) / REACH**2
+        for low, high in ((0.0, 1.0), (begin, begin + QUICK))
+    )
+    exact = (whole - third + third / FREER**2)[:, None] / TAUS**2
+    assert np.allclose(quadratic(quick, square), exact, rtol=1e-6)
+    # half of the weight beforehand: the norms hold what the determinants do not
+    shares = [one.log_norms[0] - 0.5 * slogdet_without_level(one.form / TAUS[0] ** 2 + one.fixed) for one in every]
+    assert np.exp(shares[: len(even)]) == pytest.approx(np.ones(len(even)), abs=1e-3)
+    assert np.exp(shares[len(even) :]).sum() == pytest.approx(len(even), rel=1e-3)
+
+
+def slogdet_without_level(precision):
+    return np.sum(np.log(np.linalg.eigvalsh(precision)[1:]))
+
+
 def test_the_norm_of_a_prior_is_that_of_its_density():
     """Over all g but its level the density integrates to one: by the determinant."""
-    for one in priors(moment_basis(0.0, 0.05, unit=60.0)):
+    for one in priors(moment_basis(0.0, 0.05, unit=60.0), "even"):
         for tau, norm in zip(TAUS, one.log_norms, strict=True):
             values = np.linalg.eigvalsh(one.form / tau**2 + one.fixed)[1:]  # the first is the level, without a prior
             assert norm == pytest.approx(0.5 * np.sum(np.log(values)), abs=1e-3)
@@ -182,15 +210,19 @@ def test_posterior_covers_and_answers_to_the_data_by_its_covariance():
 
 
 def test_evidence_tells_smooth_laws_from_those_with_a_step():
-    shares = []
+    smooth, quick = [], []
     for step in (False, True):
         basis, at, _, _, J = data(RNG)
+        even = len(priors(basis, "even"))
         true = 2.0 * erf((at - 0.5) / 0.02) if step else 1.5 * at**2
         value = np.r_[-(true / 0.05 + np.random.default_rng(4).normal(size=at.size)), 0.0]
         weights = averaged(value, J, np.zeros(J.shape[1]), priors(basis)).weights
-        shares.append(float(weights[1::2].sum()))
-    assert shares[1] < 0.05
-    assert shares[0] > 5.0 * shares[1]
+        smooth.append(float(weights[1:even:2].sum()))
+        quick.append(float(weights[even:].sum()))
+    assert smooth[1] < 0.05
+    assert smooth[0] > 5.0 * smooth[1]
+    assert quick[1] > 0.95
+    assert quick[0] < 0.5  # less than beforehand
 
 
 @pytest.mark.parametrize("strength", [1e3, 1e6, 1e8])
