@@ -10,7 +10,7 @@ form is one of
 
 with tau of `TAUS`, times exp(-(dg/dxi(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides
 of rest. They are proper but for the level, so K0 and the stiffness at rest cannot run away together. Laws that fall
-smoothly are known twice as well with the smooth ones; knees and plateaus are followed by the rough ones alone; laws
+smoothly are known twice as well with the smooth ones; waves and steep stretches are followed by the rough ones; laws
 that change most just beside rest, where covers hide the cable, by those over the logarithm; laws that change at one
 place and hardly elsewhere, as where wires begin to slip, by the quick ones, which need not let the rest be as rough.
 Nothing is chosen: the posterior is the average over all of them and over all tau, each normalised and weighted by its

@@ -222,6 +222,19 @@ def test_set_that_slows_down_is_no_second_cause_and_no_other(everywhere):
     assert f_error(part.extended, cable)[0] < 0.02
 
 
+def test_a_lens_that_bends_to_and_fro_is_a_lens():
+    """Pincushion in the middle of the picture and barrel toward its rim, as zoom lenses have it."""
+    reading = Reading(lens=0.012, lens_fifth=-0.02)
+    part, _, _ = diagnose(
+        faults_of_input(hidden_test(Cable(), LOOP, largest=LARGEST, seed=19, reading=reading)), None, SETTINGS
+    )
+    assert part.verdict == "named" and part.causes[0].name == "lens_distortion", part.headline
+    told = {form.label: form for form in part.causes[0].forms}
+    for label, true in (("with the cube of the distance", 0.012), ("with its fifth power", -0.02)):
+        assert told[label].amount == pytest.approx(true, abs=3.0 * told[label].std)
+    assert f_error(part.extended, Cable())[0] < 0.02
+
+
 def test_two_causes_are_both_found():
     cable = Cable(bearing_friction=0.002, displacement_offset=3e-4)
     part, _, _ = diagnose(faults_of_input(hidden_test(cable, LOOP, largest=LARGEST, seed=8)), None, SETTINGS)

@@ -5,7 +5,7 @@ centre, m) goes to the place that the photo with its stated scale claims. Bearin
 chord frame is laid through the moved bearings, so chord and shape change together.
 
     scale_error      p -> p / (1 + e)                       e: stated px/mm over true px/mm, minus 1
-    lens_distortion  p -> p (1 + k1 |p|^2 / R^2)            R: half the picture's diagonal on the plane
+    lens_distortion  p -> p (1 + k1 q + k2 q^2)             q = |p|^2 / R^2, R: half the picture's diagonal on the plane
     camera_tilt      p -> p / (1 + g . p)                   g: perspective terms along and across the chord, 1/m
 
 A tilt phi seen from the distance D has g = sin(phi) / D, and changes lengths by the square of phi as well, half a
@@ -65,12 +65,19 @@ class LensDistortion(Cause):
         """One percent at half the diagonal: a common zoom lens."""
         return DISTORTED
 
+    def variants(self, facts: Facts) -> tuple[Variant, ...]:
+        """The first two terms of the series in the square of the distance; ``at``: the power of that square."""
+        return (
+            Variant("with the cube of the distance", at=1.0, component=True),
+            Variant("with its fifth power", at=2.0, component=True, rare=True),
+        )
+
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Points move out by ``amount`` times the cube of their distance from the centre."""
+        """Points move out by ``amount`` times the third or fifth power of their distance from the centre."""
         square = facts.half_diagonal**2
 
         def move(x: Array, y: Array) -> tuple[Array, Array]:
-            grow = 1.0 + amount * (x * x + y * y) / square
+            grow = 1.0 + amount * ((x * x + y * y) / square) ** variant.at
             return x * grow, y * grow
 
         return model.observed(seen_through(move))

@@ -46,8 +46,13 @@ def test_each_half_of_a_pair_has_all_its_forms():
     beside = suspect(bench.observation, one, SUSPECTS)
     half = explanation_of((load, lens), bench.base, fit_term(bench.observation, one, beside, beside.best(lens)))
     (whole,) = with_all_forms(bench, [half])
-    assert len(whole.fitted.extension.terms) == len(half.fitted.extension.terms) + 1 == 3
-    true = {"along the chord": -0.06, "across the chord": 0.06, "": 0.012}
+    assert len(whole.fitted.extension.terms) == len(half.fitted.extension.terms) + 2 == 4
+    true = {
+        "along the chord": -0.06,
+        "across the chord": 0.06,
+        "with the cube of the distance": 0.012,
+        "with its fifth power": 0.0,
+    }
     for k, term in enumerate(whole.fitted.extension.terms):
         amount, std = whole.fitted.amount(k)
         assert amount == pytest.approx(true[term.variant.label], abs=3.0 * std)
