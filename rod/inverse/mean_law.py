@@ -40,7 +40,8 @@ def mean_law(observation: Observation, fitted: Fit, overs: Sequence[Abscissa] = 
 
     The fit as it is where that has no equilibrium. For ``overs`` see `rod.inverse.laws.AnyLaw`.
     """
-    found = [_mean_over(observation, fitted, over) for over in overs]
+    means = (_mean_over(observation, fitted, over) for over in overs)
+    found = [one for one in means if one is not fitted] or [fitted]  # a fit on its way is no rival of a mean
     return found[0] if len(found) == 1 else max(found, key=lambda one: _log_evidence(observation, one))
 
 
