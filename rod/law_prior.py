@@ -124,6 +124,7 @@ def _families(size: int, rest: float, forms: Forms) -> tuple[Family, ...]:
 
 
 def _rough(squares: list[Array]) -> Array:
+    """Form (p, p) of a rough law from `integrals`."""
     return squares[1] + squares[0] / REACH**2
 
 
