@@ -66,6 +66,10 @@ class BendingTest:
         Distributed dead load along x and y of the chord frame.
     friction_by_step : (steps, 2) N m or None
         Added to the Coulomb moments of the left and the right bearing step by step; the last ones stay.
+    moments_by_step : (steps, 2) N m or None
+        Added to the moments applied to the left and the right end step by step; the last ones stay.
+    forces_by_step : (steps, elements + 1, 2) N or None
+        Dead forces along x and y on the joints step by step; the last ones stay.
     compliance, stiffening : m/N, 1/N
         Of the rig, see `rod.reduction.Hold`.
     friction : InternalFriction or None
@@ -99,6 +103,8 @@ class BendingTest:
     right: Support = BEARING
     load: tuple[float, float] = (0.0, 0.0)
     friction_by_step: Array | None = None
+    moments_by_step: Array | None = None
+    forces_by_step: Array | None = None
     compliance: float = 0.0
     stiffening: float = 0.0
     friction: InternalFriction | None = None
@@ -140,18 +146,21 @@ class BendingTest:
         )
 
     def rod_at(self, step: int) -> Rod:
-        """The rod of a step, where bearings or length differ from step to step."""
-        rod = self.rod
+        """The rod of a step, where bearings, forces or length differ from step to step."""
+        ends: tuple[Support, ...] = (self.left, self.right)
+        changes: dict[str, Any] = {}
         if self.slid:
-            rod = replace(rod, length=self.length - self.slid[min(step, len(self.slid) - 1)])
-        if self.friction_by_step is None:
-            return rod
-        more = self.friction_by_step[min(step, len(self.friction_by_step) - 1)]
-        left, right = (
-            replace(end, friction_moment=max(end.friction_moment + float(by), 0.0))
-            for end, by in zip((self.left, self.right), more, strict=True)
-        )
-        return replace(rod, left=left, right=right)
+            changes["length"] = self.length - self.slid[min(step, len(self.slid) - 1)]
+        if (forces := at_step(self.forces_by_step, step)) is not None:
+            changes["forces"] = forces
+        if (more := at_step(self.friction_by_step, step)) is not None:
+            rubbing = (max(end.friction_moment + by, 0.0) for end, by in zip(ends, more.tolist(), strict=True))
+            ends = tuple(replace(end, friction_moment=by) for end, by in zip(ends, rubbing, strict=True))
+        if (more := at_step(self.moments_by_step, step)) is not None:
+            ends = tuple(replace(end, moment=end.moment + by) for end, by in zip(ends, more.tolist(), strict=True))
+        if ends != (self.left, self.right):
+            changes |= dict(zip(("left", "right"), ends, strict=True))
+        return replace(self.rod, **changes) if changes else self.rod
 
     @cached_property
     def free(self) -> Equilibrium:
@@ -173,7 +182,8 @@ class BendingTest:
         left, right, friction = self.left, self.right, self.friction
         ends = left.kind, right.kind, left.angle is None, right.angle is None
         rubbing = () if friction is None else (friction.stick.size, *friction.smooth)
-        given = self.grown is None, self.friction_by_step is None, self.slid, rubbing
+        by_step = self.grown, self.friction_by_step, self.moments_by_step, self.forces_by_step
+        given = *(values is None for values in by_step), self.slid, rubbing
         elements = tuple(np.atleast_1d(self.elements).tolist())
         return *ends, *given, elements, self.law_stays, self.axial_stiffness, self.shear_stiffness, self.zero
 
@@ -197,6 +207,11 @@ class BendingTest:
             chord = self.zero_chord - (value + self.displacement_offset)
             return Hold(chord=chord, compliance=self.compliance, stiffening=self.stiffening, from_zero=True)
         return Hold(chord=value) if control == "chords" else Hold(force=value)
+
+
+def at_step(given: Array | None, step: int) -> Array | None:
+    """What is given step by step (steps, ...), at a step; the last one stays. None where nothing is given."""
+    return None if given is None else np.asarray(given[min(step, len(given) - 1)])
 
 
 def bend(

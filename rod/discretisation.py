@@ -61,6 +61,8 @@ class Rod:
         Dead load per length along x and y.
     axial_stiffness, shear_stiffness : N or None
         EA and GA; None: see `RIGIDITY`.
+    forces : (n + 1, 2) N or None
+        Dead forces along x and y on the joints.
     """
 
     length: float
@@ -71,6 +73,7 @@ class Rod:
     load: tuple[float, float] = (0.0, 0.0)
     axial_stiffness: float | None = None
     shear_stiffness: float | None = None
+    forces: Array | None = None
 
     def __post_init__(self) -> None:
         if self.elements.ndim != 1 or self.elements.size < 2 or np.any(self.elements <= 0.0):
@@ -150,11 +153,14 @@ class Rod:
 
     @cached_property
     def vertex_load(self) -> Array | None:
-        """Dead load lumped to the n + 3 vertices, (n + 3, 2) N; None without load."""
-        if not any(self.load):
+        """Dead load lumped to the n + 3 vertices, with the forces on the joints, (n + 3, 2) N; None without either."""
+        if not any(self.load) and self.forces is None:
             return None
         half = 0.5 * np.concatenate(([0.0], self.edges)) + 0.5 * np.concatenate((self.edges, [0.0]))
-        return np.asarray(half[:, None] * np.asarray(self.load))
+        load = half[:, None] * np.asarray(self.load)
+        if self.forces is not None:
+            load[1:-1] += self.forces
+        return np.asarray(load)
 
     @cached_property
     def load_beyond(self) -> Array | None:
@@ -177,6 +183,7 @@ class Rod:
         """
         K0 = self.section.pre_curvature
         driven = self.load[1] != 0.0 or any(end.moment or end.angle for end in (self.left, self.right))
+        driven = driven or self.forces is not None
         low, high = float(K0.min()), float(K0.max())
         side = 1 if self.bow(self.mounted.angles) >= 0.0 else -1
         return side, not (low < 0.0 < high or (driven and low == high == 0.0))

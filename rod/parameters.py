@@ -49,8 +49,6 @@ class Toward:
 
 Parameter = str | tuple[str, Array] | Toward
 
-_SIDES = ("left", "right")
-
 
 @dataclass(frozen=True, eq=False)
 class Directions:
@@ -71,8 +69,10 @@ class Directions:
         From which law to which the characteristic goes when that parameter grows by the step.
     grown : dict of column -> (steps, n)
         Of the set that is given step by step.
-    friction_by_step : dict of side -> dict of column -> (steps,)
-        Of the friction of the bearings that is given step by step.
+    friction_by_step, moments_by_step : dict of column -> (steps, 2)
+        Of friction of the bearings and moments at the ends that are given step by step.
+    forces_by_step : dict of column -> (steps, n, 2)
+        Of forces on the joints that are given step by step.
     """
 
     names: tuple[str, ...]
@@ -85,16 +85,20 @@ class Directions:
     scalars: dict[str, Array] = field(init=False, default_factory=dict)
     laws: list[tuple[int, MomentCurve, MomentCurve, float]] = field(init=False, default_factory=list)
     grown: dict[int, Array] = field(init=False, default_factory=dict)
-    friction_by_step: dict[str, dict[int, Array]] = field(init=False, default_factory=lambda: {s: {} for s in _SIDES})
+    friction_by_step: dict[int, Array] = field(init=False, default_factory=dict)
+    moments_by_step: dict[int, Array] = field(init=False, default_factory=dict)
+    forces_by_step: dict[int, Array] = field(init=False, default_factory=dict)
 
     def scalar(self, name: str) -> Array:
         """Change of one number per parameter, (q,); zeros if it is none of them."""
         return self.scalars.get(name, self.none)
 
-    def given(self, changes: dict[int, Array], step: int) -> Array:
-        """Change at a step (q, ...) of what is given step by step; (q,) zeros if nothing is."""
+    def given(self, changes: dict[int, Array], step: int, side: int | None = None) -> Array:
+        """Change at a step (q, ...) of what is given step by step, or of one side; (q,) zeros if nothing is."""
         if not changes:
             return self.none
+        if side is not None:
+            changes = {column: by_step[:, side] for column, by_step in changes.items()}
         every = np.zeros((len(self.names), *next(iter(changes.values())).shape[1:]))
         for column, by_step in changes.items():
             every[column] = by_step[min(step, len(by_step) - 1)]
@@ -199,11 +203,10 @@ def _go_toward(toward: Toward, made: Directions, column: int) -> None:
     if test.friction is not None and other.friction is not None:
         made.slip[column] = (other.friction.slip - test.friction.slip)[:, 0] / step
         made.stick[column] = (other.friction.stick - test.friction.stick)[:, 0] / step
-    if test.grown is not None and other.grown is not None:
-        made.grown[column] = (other.grown - test.grown) / step
-    if test.friction_by_step is not None and other.friction_by_step is not None:
-        for side, change in zip(_SIDES, (other.friction_by_step - test.friction_by_step).T / step, strict=True):
-            made.friction_by_step[side][column] = change
+    for name in ("grown", "forces_by_step", "friction_by_step", "moments_by_step"):
+        before, after = getattr(test, name), getattr(other, name)
+        if before is not None and after is not before:
+            getattr(made, name)[column] = (after - before) / step
     for name, old in test.numbers.items():
         if (new := other.numbers[name]) != old:
             made.moved(name, column, (new - old) / step)

@@ -191,7 +191,7 @@ def _explicit(
         position = position + rest.zero - moves.scalar("displacement_offset") - yields
     reaction = -moves.scalar("force") if hold.force is not None else moves.none
     load = None
-    if rod.vertex_load is not None or moves.has("load_x", "load_y"):
+    if rod.vertex_load is not None or moves.has("load_x", "load_y") or moves.forces_by_step:
         load = _load_beyond(step, moves)
     curvature = np.zeros_like(moves.pre_curvature)
     if moves.geometric:
@@ -206,6 +206,9 @@ def _explicit(
 def _load_beyond(step: Equilibrium, moves: Directions) -> Array:
     """Change of the dead load to the right of each edge, (2, q, n + 1) N."""
     change = np.multiply.outer((moves.scalar("load_x"), moves.scalar("load_y")), step.rod.length_beyond)
+    if moves.forces_by_step:
+        forces = moves.given(moves.forces_by_step, step.before.step)[:, ::-1].cumsum(axis=1)[:, ::-1]
+        change[:, :, :-1] += forces.transpose(2, 0, 1)
     if any(step.rod.load) and moves.geometric:
         after = np.cumsum(moves.edges[:, ::-1], axis=1)[:, ::-1] - moves.edges
         change += np.multiply.outer(step.rod.load, 0.5 * moves.edges + after)
@@ -268,12 +271,15 @@ def _end_moment(step: Equilibrium, moves: Directions, rest: Array, slip: Array, 
     angle = float(step.angles[0 if left else -1])
     at_rest = step.rod.rest_angles[0 if left else 1]
     u = (angle - (step.before.left_angle if left else step.before.right_angle)) / support.stick_angle
-    moment = moves.scalar(f"end_moment_{side}") * (-1.0 if left else 1.0)
-    moment = moment + moves.scalar(f"bearing_stiffness_{side}") * (angle - at_rest)
-    moment = moment + moves.scalar(f"bearing_hardening_{side}") * (angle - at_rest) ** 3
-    friction = moves.scalar(f"bearing_friction_{side}") + moves.given(moves.friction_by_step[side], step.before.step)
+    number = 0 if left else 1
+    moment = moves.scalar(f"end_moment_{side}") + moves.given(moves.moments_by_step, step.before.step, number)
+    moment = moment * (-1.0 if left else 1.0)
+    _, slope, by_stiffness, by_hardening = support.spring(angle - at_rest)
+    moment = moment + moves.scalar(f"bearing_stiffness_{side}") * by_stiffness
+    moment = moment + moves.scalar(f"bearing_hardening_{side}") * by_hardening
+    friction = moves.scalar(f"bearing_friction_{side}") + moves.given(moves.friction_by_step, step.before.step, number)
     moment = moment + friction * min(1.0, max(-1.0, u))
-    if slope := support.spring(angle - at_rest)[1]:
+    if slope:
         rest = moves.scalar(f"clamp_angle_{side}") if support.angle is not None else rest
         moment = moment - slope * rest
     if support.friction_moment and -1.0 < u < 1.0:

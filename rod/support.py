@@ -6,7 +6,7 @@ when the cable is bent further, since the left angle then grows and the right on
 
     left end   m = moment - spring(angle - rest) - friction_moment clip((angle - slip) / stick_angle, -1, 1)
     right end  m = moment + spring(angle - rest) + friction_moment clip((angle - slip) / stick_angle, -1, 1)
-    spring(u) = stiffness u + hardening u^3
+    spring(u) = stiffness sinh(r u) / r,  r^2 = hardening;    where hardening < 0:  tanh(r u) / r,  r^2 = -hardening / 2
 
 ``rest`` is the angle in the mounted, force-free position unless given; ``slip`` is the memory of the friction, at the
 start the mounted angle. A Coulomb moment that sticks over a small angle instead of none keeps every step a smooth
@@ -16,11 +16,15 @@ minimisation; once the bearing has turned by ``stick_angle`` the moment is exact
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import cosh, isfinite, sinh, sqrt, tanh
 from typing import Literal, get_args
 
 Kind = Literal["bearing", "clamp", "free"]
 KINDS = get_args(Kind)
+
+
+NEARLY_LINEAR = 1e-3
+"""Of r u: below it the spring's next term, of the fourth power, is below rounding of what a simulation reaches."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +39,9 @@ class Support:
         Angle of a clamp, or rest angle of a bearing's spring. None: as mounted.
     stiffness : N m/rad
         Rotational spring of a bearing.
-    hardening : N m/rad^3
-        By which that spring stiffens (or, below 0, softens) with its turn.
+    hardening : 1/rad^2
+        By which that spring stiffens with its turn, stiffness (u + hardening u^3 / 6 + ...); below 0 it yields, to the
+        moment stiffness / sqrt(-hardening / 2).
     friction_moment : N m
         Coulomb moment of a bearing.
     stick_angle : rad
@@ -72,18 +77,26 @@ class Support:
     @property
     def turns_freely(self) -> bool:
         """Whether a bearing neither springs nor rubs."""
-        return not (self.stiffness or self.hardening or self.friction_moment)
+        return not (self.stiffness or self.friction_moment)
 
     def moment_at(self, angle: float, rest: float, slip: float) -> tuple[float, float]:
         """Moment against turning (spring and friction, N m) and its derivative by the angle (N m/rad)."""
         u = (angle - slip) / self.stick_angle
         sticking = -1.0 < u < 1.0
-        moment = self.spring(angle - rest)[0] + self.friction_moment * min(1.0, max(-1.0, u))
-        return moment, self.spring(angle - rest)[1] + (self.friction_moment / self.stick_angle if sticking else 0.0)
+        moment, slope, *_ = self.spring(angle - rest)
+        moment += self.friction_moment * min(1.0, max(-1.0, u))
+        return moment, slope + (self.friction_moment / self.stick_angle if sticking else 0.0)
 
-    def spring(self, turn: float) -> tuple[float, float]:
-        """Moment of the spring at a turn from its rest (N m) and its derivative by it (N m/rad)."""
-        return (self.stiffness + self.hardening * turn**2) * turn, self.stiffness + 3.0 * self.hardening * turn**2
+    def spring(self, turn: float) -> tuple[float, float, float, float]:
+        """Moment of the spring at a turn from its rest (N m), its derivative by it, by stiffness and by hardening."""
+        k, h = self.stiffness, self.hardening
+        rate = sqrt(h) if h > 0.0 else sqrt(-0.5 * h)
+        x = rate * turn
+        if abs(x) < NEARLY_LINEAR:
+            cubic = turn**3 / 6.0
+            return k * (turn + h * cubic), k * (1.0 + 0.5 * h * turn**2), turn + h * cubic, k * cubic
+        value, slope = (sinh(x), cosh(x)) if h > 0.0 else (tanh(x), 1.0 - tanh(x) ** 2)
+        return k * value / rate, k * slope, value / rate, 0.5 * k * (slope * turn - value / rate) / h
 
     def advanced(self, angle: float, slip: float) -> float:
         """Memory of the friction after a step that ended at ``angle``."""

@@ -199,6 +199,18 @@ def test_a_spring_that_stiffens_with_the_turn_of_its_bearing_is_named():
     assert f_error(part.extended, cable)[0] < 0.02
 
 
+@pytest.mark.parametrize(("protocol", "verdicts"), [(LOOP, {"named"}), (SIX, {"named", "class"})])
+def test_a_seal_that_yields_with_the_turn_of_its_bearing_is_named(protocol, verdicts):
+    """Its moment levels off within 0.4 rad, by another form than the fitted one; friction is no different without
+    unloading, and may stand beside it then."""
+    cable = Cable(bearing_spring=lambda turn: 2.25e-3 * (turn / 0.4) / np.hypot(1.0, turn / 0.4), sides=(1.0, 0.8))
+    part, _, _ = diagnose(faults_of_input(hidden_test(cable, protocol, largest=LARGEST, seed=17)), None, SETTINGS)
+    assert part.verdict in verdicts, part.headline
+    assert "bearing_stiffness" in part.causes[0].class_ and len(part.causes) == 1
+    assert set(part.causes[0].class_) <= {"bearing_stiffness", "bearing_friction"}
+    assert f_error(part.extended, cable)[0] < 0.02
+
+
 @pytest.mark.parametrize("law_stays", [False, True])
 def test_set_is_named_whether_its_law_moves_along_or_stays(law_stays):
     """Against friction, which the form that does not fit had been told as, with f_EI a fifth off."""

@@ -28,8 +28,8 @@ EVERYTHING = BendingTest(
     load=(0.05, 0.1),
     compliance=1e-3,
     stiffening=0.5,
-    left=Support(stiffness=2e-3, friction_moment=3e-4, rigid_length=4e-3),
-    right=Support(stiffness=1e-3, friction_moment=2e-4, rigid_length=3e-3),
+    left=Support(stiffness=2e-3, hardening=2.0, friction_moment=3e-4, rigid_length=4e-3),
+    right=Support(stiffness=1e-3, hardening=-2.0, friction_moment=2e-4, rigid_length=3e-3),
     friction=InternalFriction(1e-3, 1.5),
     plastic_rate=0.05,
     set_threshold=0.3,
@@ -80,8 +80,8 @@ VARIATIONS: dict[str, tuple[Vary, float]] = {
     "bearing_stiffness": (lambda t, h: both({"stiffness": h}, t, h), 3e-6),
     "bearing_stiffness_left": (one("left", "stiffness"), 3e-6),
     "bearing_stiffness_right": (one("right", "stiffness"), 3e-6),
-    "bearing_hardening_left": (one("left", "hardening"), 3e-6),
-    "bearing_hardening_right": (one("right", "hardening"), 3e-6),
+    "bearing_hardening_left": (one("left", "hardening"), 3e-3),
+    "bearing_hardening_right": (one("right", "hardening"), 3e-3),
     "bearing_friction": (lambda t, h: both({"friction_moment": h}, t, h), 3e-6),
     "bearing_friction_left": (one("left", "friction_moment"), 3e-6),
     "bearing_friction_right": (one("right", "friction_moment"), 3e-6),
@@ -194,9 +194,10 @@ def test_clamps_follow_their_angle(side: str) -> None:
 
 @pytest.mark.parametrize("name", ["angle", "stiffness", "hardening"])
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_springs_follow_their_numbers(side: str, name: str) -> None:
-    test = replace(EVERYTHING, **{side: Support(stiffness=2e-3, hardening=5e-3, angle=0.3)}, friction=None)
-    vary, h = one(side, name), 1e-4 if name == "angle" else 3e-6
+@pytest.mark.parametrize("hardening", [3.0, -3.0])
+def test_springs_follow_their_numbers(hardening: float, side: str, name: str) -> None:
+    test = replace(EVERYTHING, **{side: Support(stiffness=2e-3, hardening=hardening, angle=0.3)}, friction=None)
+    vary, h = one(side, name), 3e-6 if name == "stiffness" else 1e-4
     assert worst_error(test, Toward(test, vary(test, h), h), vary, h, displaced) < 1e-6
 
 
@@ -300,6 +301,24 @@ def rubbing(test: BendingTest, h: float) -> BendingTest:
     return replace(test, friction_by_step=test.friction_by_step + h * np.c_[[0, 1, 2, -1, 1, 3.0], [2, 0, 1, 1, -1, 1]])
 
 
+PUSHED = replace(
+    EVERYTHING,
+    friction=None,
+    plastic_rate=0.0,
+    moments_by_step=10.0 * BY_STEP,
+    forces_by_step=np.multiply.outer([0.0, 0.02, -0.03, 0.01, 0.02, 0.0], np.c_[np.sin(7.0 * XI), np.cos(3.0 * XI)]),
+)
+
+
+def pushing(test: BendingTest, h: float) -> BendingTest:
+    more = np.multiply.outer([1.0, 0.0, 2.0, -1.0, 1.0, 3.0], np.c_[np.eye(JOINTS)[7], np.eye(JOINTS)[25]])
+    return replace(test, forces_by_step=test.forces_by_step + h * more)
+
+
+def turning(test: BendingTest, h: float) -> BendingTest:
+    return replace(test, moments_by_step=test.moments_by_step + h * np.c_[[0, 1, 2, -1, 1, 3.0], [2, 0, 1, 1, -1, 1]])
+
+
 def stick_angles(test: BendingTest, h: float) -> BendingTest:
     ends = [replace(s, stick_angle=s.stick_angle + h) for s in (test.left, test.right)]
     return replace(test, left=ends[0], right=ends[1])
@@ -323,6 +342,9 @@ def inner_knot(test: BendingTest, h: float) -> BendingTest:
         (EVERYTHING, inner_knot, 1e-3),
         (GIVEN, given_set, 3e-4),
         (RUBBING, rubbing, 3e-6),
+        (PUSHED, pushing, 3e-5),
+        (PUSHED, turning, 3e-6),
+        (PUSHED, VARIATIONS["length"][0], 3e-6),
         (replace(GIVEN, law_stays=True), given_set, 3e-4),
     ],
 )

@@ -56,7 +56,10 @@ def reference(test: BendingTest, guess, *, chord=None, force=None, tip=None, tur
 
     def turning(support, angle, at_rest, direction):
         turn = angle - at_rest
-        return support.stiffness * turn + support.hardening * turn**3 + support.friction_moment * direction
+        rate = np.sqrt(support.hardening if support.hardening > 0.0 else -0.5 * support.hardening)
+        course = np.sinh if support.hardening > 0.0 else np.tanh
+        spring = support.stiffness * (course(rate * turn) / rate if rate else turn)
+        return spring + support.friction_moment * direction
 
     def ends(first, last, R):
         # The rigid pieces are straight: their lever arms and loads are closed forms.
@@ -116,8 +119,8 @@ BEARINGS = {
     "pre-curvature along s": replace(BASE, pre_curvature=lambda xi: 2.0 + 1.5 * xi + np.cos(2 * np.pi * xi)),
     "soft spot": replace(BASE, stiffness_profile=lambda xi: 1.0 - 0.4 * np.exp(-(((xi - 0.4) / 0.1) ** 2))),
     "springs": replace(BASE, left=Support(stiffness=0.02), right=Support(stiffness=0.05)),
-    "springs that stiffen": replace(
-        BASE, left=Support(stiffness=0.02, hardening=0.1), right=Support(stiffness=0.05, hardening=-0.02)
+    "springs that stiffen and yield": replace(
+        BASE, left=Support(stiffness=0.02, hardening=8.0), right=Support(stiffness=0.05, hardening=-6.0)
     ),
     "spring with rest angle": replace(BASE, left=Support(stiffness=0.02, angle=0.6)),
     "Coulomb moments": replace(BASE, left=Support(friction_moment=1e-3), right=Support(friction_moment=2e-3)),

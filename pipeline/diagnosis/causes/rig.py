@@ -127,18 +127,16 @@ class BearingStiffness(Cause):
         return 0.05 * facts.moment_scale / facts.curvature_scale / facts.length
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Both bearings alike, or each a spring of its own; a seal stiffens with its turn (1 + ``width`` turn^2)."""
-        stiffening = Variant("that stiffens with the turn", width=1.0, tuned=("width",), width_range=(0.0, 10.0))
-        return (Variant(), stiffening, *each_bearing(Variant()))
+        """Both bearings alike, or each a spring of its own; seals stiffen or yield with their turn (`rod.support`)."""
+        stiffening = Variant("that stiffens with the turn", width=6.0, tuned=("width",), width_range=(0.0, 20.0))
+        yielding = Variant("that yields with the turn", width=-20.0, tuned=("width",), width_range=(-200.0, 0.0))
+        return (Variant(), stiffening, yielding, *each_bearing(Variant()))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Give the bearings the spring ``amount``, at rest."""
-
-        def stiffer(end: Support) -> Support:
-            hardening = end.hardening + amount * variant.width
-            return replace(end, stiffness=end.stiffness + amount, hardening=hardening)
-
-        return _at_bearings(model, variant, stiffer)
+        return _at_bearings(
+            model, variant, lambda end: replace(end, stiffness=end.stiffness + amount, hardening=variant.width)
+        )
 
 
 class RigidEnds(Cause):

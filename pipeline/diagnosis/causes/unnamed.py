@@ -7,15 +7,12 @@ pre-curvature   K0 is another one from a hold on: the cable rolled about its axi
 stiffness       all moments are multiplied by another factor from a hold on: a heater was switched on, a strand broke
 length          less of the cable lies between the axes from a hold on: it slid through a bearing
 
-And forces may act that no model has, with moments that come and go over the steps, from the first or a later one
-on, as cosines of order o, normal about nothing, of a standard deviation that falls with 1 / (1 + o):
+And forces may act that no model has, as they come and go over the steps, from the first or a later one on, as cosines
+of order o, normal about nothing, of a standard deviation that falls with 1 / (1 + o):
 
-moments         at one bearing or both (a stop, a cable that is led in), falling to nothing at the other; or along the
-                cable (a pad, a magnet, a tether): loads of one to four half waves, as likely each, have moments
-                M'' = q that fall with the square of their number
-
-A moment M at a place bends the cable there as a rest that is moved by M / f_EI does: force and shape are the same. So
-they are told as that curvature, 1/m.
+moments         at one bearing or both: a stop, a cable that is led in
+forces          across the chord, at a place: a support that is touched, a tether; or along the cable, in one to four
+                half waves, as likely each: a pad, a magnet
 
 None has a name in the catalogue, so what it explains is something else; but f_EI beside it can be told, and where
 and when it acts.
@@ -23,9 +20,9 @@ and when it acts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +33,19 @@ from rod.inverse.extension import Term
 from rod.inverse.prediction import Facts, Model
 
 Array = NDArray[np.float64]
+
+SIZES = (0.01, 0.003, 0.03)
+"""Of the largest force or moment, their standard deviation: steps of a factor 3.3, over which a normal density hardly
+changes, from what is just seen to what is another experiment; the middle one is tried first."""
+
+SHARE = 0.25
+"""Of the probability of something else beforehand: of what begins between two holds, and of unknown forces."""
+
+WAVES = {f"{k} half waves": float(k) for k in (1, 2, 3, 4)}
+"""Forms of forces along the cable."""
+
+POINTS = {f"{u:.1f}": u for u in (0.1, 0.3, 0.5, 0.7, 0.9)}
+"""Shares of the length near which one may act."""
 
 GROWS = (("as it begins", 0.0), ("growing", 1.0))
 """Labels of what stays as it begins, and of what grows by as much in every further hold."""
@@ -78,7 +88,7 @@ class OtherRest(_Begun):
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount`` to K0 from the step ``at`` on."""
-        return _with_rest(model, amount * self.course(variant, facts), np.ones_like)
+        return _with_rest(model, amount * self.course(variant, facts))
 
 
 class OtherStiffness(_Begun):
@@ -113,36 +123,27 @@ class OtherLength(_Begun):
         return replace(model, bending=replace(model.bending, slid=tuple(slid)))
 
 
-class OtherMoments(Cause):
-    """Moments over the steps: the label says along what of the cable.
+class _Unknown(Cause):
+    """Forces or moments over the steps: the label says where on the cable.
 
     ``at`` is the order of their course, ``width`` the index of the step from which on they act.
     """
 
-    name = "unnamed.moments"
-    unit = "1/m"
     seat = "rig"
-
-    def plausible(self, facts: Facts) -> float:
-        """The range of curvatures, of which shares are tried."""
-        return facts.curvature_scale
+    places: ClassVar[dict[str, tuple[str, ...]]]
 
     def chance(self, variant: Variant, facts: Facts) -> float:
         """Probability beforehand of one place, size and begin, given that something else acts."""
         begins = max(len(facts.pushed) - 1, 1) if variant.width else 1
-        return 0.5 * SHARE / len(PLACES) / len(SIZES) / begins
+        return 0.25 * SHARE / len(self.places) / len(SIZES) / begins
 
-    def ways(self, facts: Facts) -> Iterator[tuple[Term, ...]]:
-        """The terms of each place where such moments may act, in each size."""
-        for forms in PLACES.values():
-            for size in SIZES:
-                orders = range(len(facts.branch))
-                known = {(form, o): size * MOST[form] / (1 + o) for o in orders for form in forms}
-                every = (Variant(form, at=float(o), known=std) for (form, o), std in known.items())
-                yield tuple(Term(self, variant) for variant in every)
+    def ways(self, facts: Facts, labels: Sequence[str], size: float) -> tuple[Term, ...]:
+        """The terms of forces or moments at all of these places together, of one of `SIZES`."""
+        known = {(label, o): size / (1 + o) for o in range(len(facts.branch)) for label in labels}
+        return tuple(Term(self, Variant(label, at=float(o), known=std)) for (label, o), std in known.items())
 
     def since(self, terms: Sequence[Term], facts: Facts) -> Iterator[tuple[Term, ...]]:
-        """The same moments, from each step under load but the first on."""
+        """The same ones, from each step under load but the first on."""
         for first in facts.pushed[1:]:
             later = (term._replace(variant=replace(term.variant, width=float(first))) for term in terms)
             yield tuple(term for term in later if term.variant.at < len(facts.branch) - first)
@@ -155,49 +156,105 @@ class OtherMoments(Cause):
         course[first:] = np.cos(np.pi * variant.at * (np.arange(count) + 0.5) / count)
         return course
 
-    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Move the rest by ``amount`` along a form, as its course says."""
-        return _with_rest(model, amount * self.course(variant, facts), FORMS[variant.label])
-
     def together(self, forms: Sequence[Variant], facts: Facts) -> tuple[str, Array]:
-        """Curvature at every step, for one form along the cable after the other."""
+        """Force or moment at every step, for one form along the cable after the other."""
         labels = dict.fromkeys(form.label for form in forms)
         rows = [[self.course(form, facts) * (form.label == label) for form in forms] for label in labels]
         return self.unit, np.concatenate(np.array(rows).swapaxes(1, 2))
 
 
-def _half_waves(k: int, u: Array) -> Array:
-    return np.asarray(np.sin(k * np.pi * u))
+class UnknownMoments(_Unknown):
+    """Moments at one bearing or both."""
+
+    name = "unnamed.moments"
+    unit = "N m"
+    places: ClassVar = {"unnamed.left": ("left",), "unnamed.right": ("right",), "unnamed.both": ("left", "right")}
+
+    def plausible(self, facts: Facts) -> float:
+        """The largest moment, of which shares are tried."""
+        return facts.moment_scale
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Bend an end of the cable by ``amount``, as its course says."""
+        more = amount * np.outer(self.course(variant, facts), np.array(["left", "right"]) == variant.label)
+        given = model.bending.moments_by_step
+        return replace(model, bending=replace(model.bending, moments_by_step=more if given is None else given + more))
 
 
-WAVES = {f"{k} half waves": partial(_half_waves, k) for k in (1, 2, 3, 4)}
-FORMS: dict[str, Callable[[Array], Array]] = {"left": lambda u: 1.0 - u, "right": lambda u: u, **WAVES}
-MOST = {"left": 1.0, "right": 1.0} | {label: wave.args[0] ** -2.0 for label, wave in WAVES.items()}
-"""Forms of unknown moments along the cable, and how large each is beside the others."""
+class UnknownForces(_Unknown):
+    """Forces across the chord: along the cable, or at a place."""
 
-PLACES = {
-    "unnamed.left": ("left",),
-    "unnamed.right": ("right",),
-    "unnamed.both": ("left", "right"),
-    "unnamed.along": (*WAVES,),
-}
-"""Where unknown moments act, as it is told, and in which forms."""
+    name = "unnamed.forces"
+    unit = "N"
+    places: ClassVar = {"unnamed.along": (*WAVES,), **{f"unnamed.at {label}": (label,) for label in POINTS}}
 
-SIZES = (0.003, 0.01, 0.03)
-"""Of the range of curvatures, their standard deviation: steps of a factor 3.3, over which a normal density hardly
-changes, from what is just seen to what is another experiment."""
+    def plausible(self, facts: Facts) -> float:
+        """The largest force, of which shares are tried."""
+        return facts.force_scale
 
-SHARE = 0.25
-"""Of the probability of something else beforehand: of what begins between two holds, and of unknown moments."""
+    def ways(self, facts: Facts, labels: Sequence[str], size: float) -> tuple[Term, ...]:
+        """The terms of forces at all of these places together, and where near a place they act."""
+        terms = super().ways(facts, labels, size)
+        return terms if labels[0] in WAVES else (*terms, Term(PLACE, Variant(labels[0], known=1.0)))
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Push the cable by ``amount``, as its course says; a half wave's is the force of one that points one way."""
+        joints = _joints(model)
+        if variant.label in WAVES:
+            along = 0.5 * np.pi * np.sin(WAVES[variant.label] * np.pi * joints) / (len(joints) - 1)
+        else:
+            along = _at(POINTS[variant.label], joints)
+        across = np.outer(amount * self.course(variant, facts), along)
+        return _pushed(model, np.stack([np.zeros_like(across), across], axis=2), model.bending.forces_by_step)
 
 
-def _with_rest(model: Model, by_step: Array, form: Callable[[Array], Array]) -> Model:
-    """The model whose rest is moved at each step (steps,), 1/m, along a form over shares of the length."""
+class PlaceOfForce(Cause):
+    """Where near the place of its label the force acts that is in the model: so far beside it."""
+
+    name = "unnamed.place"
+    unit = "-"
+    seat = "rig"
+
+    def plausible(self, facts: Facts) -> float:
+        """Half of the distance of two places."""
+        return 0.5 / len(POINTS)
+
+    def chance(self, variant: Variant, facts: Facts) -> float:
+        """That of the force is all there is."""
+        return 1.0
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Let the forces act at ``amount`` (of the length) beyond their place."""
+        forces, joints = model.bending.forces_by_step, _joints(model)
+        whole = np.zeros((1, 2)) if forces is None else forces.sum(axis=1)
+        return _pushed(model, whole[:, None, :] * _at(POINTS[variant.label] + amount, joints)[:, None])
+
+
+def _joints(model: Model) -> Array:
+    """Shares of the length at the joints (n,) of a cable of equal elements."""
+    return np.linspace(0.0, 1.0, int(model.bending.elements) + 1)
+
+
+def _at(u: float, joints: Array) -> Array:
+    """A force at a share of the length, divided between the two joints (n,) beside it."""
+    inside = min(max(u, joints[1]), joints[-2])
+    return np.asarray(np.maximum(1.0 - np.abs(joints - inside) / joints[1], 0.0))
+
+
+def _pushed(model: Model, forces: Array, beside: Array | None = None) -> Model:
+    """The model with forces (steps, n, 2) N on its joints."""
+    return replace(model, bending=replace(model.bending, forces_by_step=forces if beside is None else beside + forces))
+
+
+def _with_rest(model: Model, by_step: Array) -> Model:
+    """The model whose rest is moved at each step (steps,), 1/m."""
     joints, given = len(model.bending.rod.section.pre_curvature), model.bending.grown
-    more = np.outer(by_step, form(np.linspace(0.0, 1.0, joints)))
+    more = np.outer(by_step, np.ones(joints))
     return replace(model, bending=replace(model.bending, grown=more if given is None else given + more))
 
 
-BEGUN = (OtherRest(), OtherStiffness(), OtherLength())
-MOMENTS = OtherMoments()
-UNNAMED: tuple[_Begun | OtherMoments, ...] = (*BEGUN, MOMENTS)
+OTHER_STIFFNESS = OtherStiffness()
+BEGUN = (OtherRest(), OTHER_STIFFNESS, OtherLength())
+PLACE = PlaceOfForce()
+UNKNOWN: tuple[UnknownMoments | UnknownForces, ...] = (UnknownMoments(), UnknownForces())
+UNNAMED: tuple[_Begun | _Unknown | PlaceOfForce, ...] = (*BEGUN, *UNKNOWN, PLACE)

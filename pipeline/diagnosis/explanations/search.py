@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.unnamed import BEGUN, MOMENTS
+from pipeline.diagnosis.causes.unnamed import BEGUN, SIZES, UNKNOWN, UnknownForces, UnknownMoments
 from pipeline.diagnosis.explanations.candidates import LEAST, candidates, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
@@ -213,11 +213,23 @@ class Search:
             since = [k for k in loud if k is not None and about.statistic[k] ** 2 > least]
             fits = (fit_term(bench.observation, one.fitted, about, k, hopeless=hopeless) for k in since)
             self._weigh_unnamed(one.causes, fits)
-        self._weigh_unnamed((), self._with(MOMENTS.ways(bench.facts)))
+        middle, *others = SIZES
+        places = [(unknown, labels) for unknown in UNKNOWN for labels in unknown.places.values()]
+        self._weigh_unnamed((), self._with(unknown.ways(bench.facts, labels, middle) for unknown, labels in places))
+        if (found := self._unknown()) is not None:
+            unknown, terms = found
+            labels = tuple(dict.fromkeys(term.variant.label for term in terms))
+            self._weigh_unnamed((), self._with(unknown.ways(bench.facts, labels, size) for size in others))
+        if (found := self._unknown()) is not None:
+            unknown, terms = found
+            self._weigh_unnamed((), self._with(unknown.since(terms, bench.facts)))
+
+    def _unknown(self) -> tuple[UnknownForces | UnknownMoments, tuple[Term, ...]] | None:
+        """Unknown forces or moments where they are the likeliest of what has no name, and their terms."""
         likely = (one.found for one in self.posterior.beside_something_else() if one.probability > ALSO)
         whole = next((one for one in likely if one is not None and one.unnamed and not one.causes), None)
-        if whole is not None and whole.fitted.extension.terms_of(MOMENTS):
-            self._weigh_unnamed((), self._with(MOMENTS.since(whole.fitted.extension.terms, bench.facts)))
+        terms = () if whole is None else whole.fitted.extension.terms
+        return next(((unknown, terms) for unknown in UNKNOWN if terms and terms[0].cause is unknown), None)
 
     def _with(self, every: Iterable[tuple[Term, ...]]) -> Iterator[Fit]:
         """The base model with terms from nothing, fitted."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.diagnosis.causes.unnamed import OTHER_STIFFNESS
 from pipeline.diagnosis.fits.search import suspect
 from rod.inverse.fit import Fit
 from rod.inverse.mean_law import mean_law, mean_posterior, moved_by_forces
@@ -64,15 +65,18 @@ def identified_again(
 
 
 def _of_the_middle(fitted: Fit) -> Fit | None:
-    """The model with f_EI of the middle one of all places along a cable whose stiffness varies; None where it does not.
+    """The model with f_EI of the middle of a cable whose stiffness varies, along it or over the steps; else None.
 
     Of a cable with a soft spot the rest is wanted, and is its middle; with several forms none of its places may be the
-    one that the law is of, and which of them it is part of the band.
+    one that the law is of. Of moments that are others from a step on nobody knows which ones are right, those before or
+    after, and the middle is the mean over the steps. How far it lies from the law is part of the band.
     """
-    profile = fitted.run.model.bending.rod.section.profile
-    if profile is None:
-        return None
-    return replace(fitted, vector=fitted.extension.base.stiffer(fitted.vector, float(np.median(profile))))
+    extension, profile = fitted.extension, fitted.run.model.bending.rod.section.profile
+    ratio = 1.0 if profile is None else float(np.median(profile))
+    for k in extension.terms_of(OTHER_STIFFNESS):
+        course = OTHER_STIFFNESS.course(extension.terms[k].variant, extension.facts)
+        ratio *= 1.0 + float(fitted.vector[extension.amounts_at[k]] * np.mean(course))
+    return None if ratio == 1.0 else replace(fitted, vector=extension.base.stiffer(fitted.vector, ratio))
 
 
 def _with_other_forms(observation: Observation, again: Identified) -> Identified:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.diagnosis.causes.unnamed import BEGUN, MOMENTS, PLACES
+from pipeline.diagnosis.causes.unnamed import BEGUN, PLACE, POINTS, UNKNOWN
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.maps import whereabouts
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -43,8 +43,8 @@ def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
 def _unnamed(bench: Workbench, fitted: Fit) -> Message | None:
     """What acts on the cable and has no name in the catalogue, if that is in the model."""
     for k, term in enumerate(fitted.extension.terms):
-        if term.cause is MOMENTS:
-            return _moments(bench, fitted)
+        if term.cause in UNKNOWN:
+            return _unknown(bench, fitted)
         if term.cause in BEGUN:
             step, size = bench.test.steps[int(term.variant.at)], (*fitted.amount(k), term.cause.unit)
             more = Message("begun.growing") if term.variant.width else ""
@@ -52,20 +52,31 @@ def _unnamed(bench: Workbench, fitted: Fit) -> Message | None:
     return None
 
 
-def _moments(bench: Workbench, fitted: Fit) -> Message:
-    """Where moments act that no model has, since which step, and when they are largest."""
-    extension, own = fitted.extension, fitted.extension.terms_of(MOMENTS)
+def _unknown(bench: Workbench, fitted: Fit) -> Message:
+    """Where forces or moments act that no model has, since which step, and when they are largest."""
+    extension = fitted.extension
+    cause = next(one for one in UNKNOWN if extension.terms_of(one))
+    own = extension.terms_of(cause)
     forms, at = [extension.terms[k].variant for k in own], [extension.amounts_at[k] for k in own]
-    unit, rows = MOMENTS.together(forms, bench.facts)
-    loudest, labels = int(np.argmax(np.abs(rows @ fitted.vector[at]))), {form.label for form in forms}
+    unit, rows = cause.together(forms, bench.facts)
+    labels = tuple(dict.fromkeys(form.label for form in forms))
+    loudest = int(np.argmax(np.abs(rows @ fitted.vector[at])))
     row, steps, first = rows[loudest], bench.test.steps, int(forms[0].width)
     step, std = steps[loudest % len(steps)], np.sqrt(row @ fitted.covariance[np.ix_(at, at)] @ row)
-    place = next(place for place, some in PLACES.items() if {*some} == labels)
     return Message(
-        MOMENTS.name,
-        place=Message(place),
+        cause.name,
+        place=_place(bench, fitted) or Message(next(name for name, some in cause.places.items() if some == labels)),
         since=Message("unnamed.since", step=steps[first].step) if first else "",
         step=step.step,
         branch=step.branch,
         size=(float(row @ fitted.vector[at]), float(std), unit),
     )
+
+
+def _place(bench: Workbench, fitted: Fit) -> Message | None:
+    """Where along the cable a force acts that no model has; None where there is no such place."""
+    for k in fitted.extension.terms_of(PLACE):
+        (beside, std), length = fitted.amount(k), bench.facts.length
+        at = POINTS[fitted.extension.terms[k].variant.label] + beside
+        return Message("unnamed.at", at=(at * length, std * length, "m"))
+    return None
