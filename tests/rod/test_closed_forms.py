@@ -9,13 +9,14 @@ from rod.balance.moment_points import HIDDEN, _arc, _tied
 from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic
 from rod.compliance_law import CELLS, moment_basis, refreshed
+from rod.equilibrium import solve
 from rod.inverse.camera import axes_off, scaled
 from rod.inverse.observation import Places, foot_points
 from rod.inverse.prediction import Prediction
 from rod.law_prior import NEAR_REST, integrals
 from rod.paper import _from_photo, _graph
 from rod.reduction import Hold
-from rod.support import Support
+from rod.support import CLAMP, FREE, Support
 
 LENGTH, RADIUS = 0.2, 0.15
 HALF = 0.5 * LENGTH / RADIUS
@@ -170,3 +171,26 @@ def test_noise_of_the_papers_photo_lies_along_the_normal(monkeypatch):
 def test_what_cannot_be_is_refused(make, words):
     with pytest.raises(ValueError, match=words):
         make()
+
+
+def test_forces_and_moments_of_a_step_bend_a_cantilever_as_beam_theory_says() -> None:
+    """Deflection F a^2 (3 L - a) / (6 EI) by a force at a, M L^2 / (2 EI) by a moment at the end; the last step stays.
+
+    Gere and Timoshenko, Mechanics of Materials, appendix on cantilever beams, cases 5 and 6.
+    """
+    EI, L, F, M, n = 2.0, 0.5, 1e-4, -3e-5, 100
+    forces = np.zeros((2, n + 1, 2))
+    forces[1, 60] = 0.0, F
+    test = BendingTest(
+        L,
+        EI,
+        left=CLAMP,
+        right=FREE,
+        elements=n,
+        forces_by_step=forces,
+        moments_by_step=np.array([[0.0, M], [0.0, 0.0]]),
+    )
+    tips = [solve(test.rod_at(step), Hold(tip=(0.0, 0.0))).y[-1] for step in (0, 1, 2)]
+    a = 0.6 * L
+    pushed = F * a**2 * (3.0 * L - a) / (6.0 * EI)
+    assert tips == pytest.approx([-M * L**2 / (2.0 * EI), pushed, pushed], rel=1e-4)
