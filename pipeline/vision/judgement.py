@@ -42,6 +42,7 @@ from pipeline.vision.search.strips import Strip
 
 _LEAST_SLENDERNESS = 10.0  # widths; a shorter strip of unknown width is a fold or a thing: no rod bends on ten
 _LEAST_BEFORE_COVER = 1.0  # widths; a shorter piece of cable between a band across it and a cover shows no direction
+_LEAST_REST = 1.0  # widths; so much that looks like the cable beyond its end is told
 _BLURRED = 0.1  # widths; with more blur that, and no missing cover, is why no axis was found
 _ACCEPTED_WIDTH_RATIO = (0.65, 1.35)  # ratio of the edges' distance to the diameter; a sheath may be dark at its flanks
 
@@ -116,7 +117,9 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     if refusal is not None:
         return refusal
     others = [other for other in reading.strips if other is not strip]
-    more = more_beyond(standout, cut, axes, others, length_px=cable.length_px)
+    # a screw or a jaw beyond an end is shorter than a piece; where a length is known, that tells of a short rest
+    least = _LEAST_REST if cable.any_length else LEAST_MORE_WIDTHS
+    more = more_beyond(standout, cut, axes, others, length_px=cable.length_px, least=least)
     if more is not None and not cable.any_length:
         return refused_at(photo, "photo/hidden-end.goes-on", more)
     found = _assemble(photo, standout, cut, axes, cable)

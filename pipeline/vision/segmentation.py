@@ -143,7 +143,7 @@ def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | 
 
 def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected) -> bool:
     """Whether the cable is seen better in one colour: what is narrower or shorter may be a stripe or a half of it."""
-    if isinstance(in_one, Rejected) or any(finding.code == "photo/hidden-end" for finding in in_one.findings):
+    if isinstance(in_one, Rejected) or _is_piece(in_one):
         return False  # a piece of the cable may be anything of that colour too
     if isinstance(found, Rejected):
         return True
@@ -197,10 +197,12 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     best = _widest_alike(likely)
     for _, refusal, path in refusals:
         # other readings of a photo that shows a crossing, or the cable cut, may show one arm of it as a clean strip
-        length = float(step_lengths(path).sum())
-        longer = length > best.length_px and _length_beyond(path, best) > 2.0 * LEAST_MORE_WIDTHS * best.half_width_px
+        length, beyond = float(step_lengths(path).sum()), _length_beyond(path, best)
+        longer = length > best.length_px and beyond > 2.0 * LEAST_MORE_WIDTHS * best.half_width_px
         if longer and refusal.code in ("photo/crossing", "photo/hidden-end"):
             return refusal
+        if refusal.code == "photo/crossing" and _is_piece(best) and beyond < 0.5 * length:
+            return refusal  # or a piece that ends where it comes to the crossing
         if refusal.code == "photo/leaves-frame" and _lies_on(best, [path]):
             return refusal
     if not best.evidence.enough:
@@ -228,6 +230,11 @@ def _widest_alike(likely: list[RoughCable]) -> RoughCable:
         if wider and found.evidence.value > 0.85 * best.evidence.value and _lies_on(found, [best.path_px]):
             best = found
     return best
+
+
+def _is_piece(found: RoughCable) -> bool:
+    """True if something is said to hide the rest of a cable."""
+    return any(finding.code == "photo/hidden-end" for finding in found.findings)
 
 
 def _is_rival(found: RoughCable, best: RoughCable) -> bool:

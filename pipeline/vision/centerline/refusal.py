@@ -25,6 +25,7 @@ _WIDTH_OFF = 0.15
 which moves edges by a part of itself.
 """
 _BESIDE_COVER = 0.5  # radii; flanks, shadows and stripes pass a cover's axis by 0.85 and more, a cable by a tenth
+_BESIDE_DOUBTED = 1.0  # radii; a cover that is not surely seen may lie elsewhere, but the cable runs over its axis
 _UNEVEN_PX, _UNEVEN = 0.8, 0.025  # px and widths; scatter of middles about a smooth curve: shades on white 0.04 widths
 _BEND = 0.5  # curvature times diameter; on a radius of two diameters a cable kinks, a curve led astray bends
 _AXIS_DISTANCE_RADII = 0.25
@@ -79,16 +80,16 @@ def _uneven(fit: CurveFit, sections: Sections, middle: float) -> Message | None:
 
 
 def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: float) -> Message | None:
-    """A flank or a shadow, which runs beside the cable from end to end; or another thing taken for a cover.
+    """A flank or a shadow, which runs beside the cable from end to end; or another thing taken for a cover or an end.
 
-    One cover that is surely seen may be passed beside: not every cable runs through the axis of its bearing. One that
-    is not may lie elsewhere than it was found, but the cable runs over its axis.
+    One cover that is surely seen may be passed beside: not every cable runs through the axis of its bearing.
     """
     axes = rough.axes
-    radii = feet_of_axes(fit, chord)[1] / (0.5 * middle) * [axis.radius_px is not None for axis in axes]
-    doubted = [_BESIDE_COVER * radius for radius, axis in zip(radii, axes, strict=True) if not axis.sure]
-    share = float(max(radii.min(), *doubted, 0.0))
-    return None if share <= _BESIDE_COVER else Message("photo/bearing.beside-cover", radii=min(share, 99.0))
+    radii = feet_of_axes(fit, chord)[1] / (0.5 * middle) * [axis.kind != "given" for axis in axes]
+    wrong = [radius for radius, axis in zip(radii, axes, strict=True) if radius > _BESIDE_DOUBTED and not axis.sure]
+    wrong += [radii.min()] if radii.min() > _BESIDE_COVER else []
+    key = "photo/bearing.beside-cover" if chord.marked else "photo/outline.beside-end"
+    return Message(key, radii=min(float(max(wrong)), 99.0)) if wrong else None
 
 
 def _bent(fit: CurveFit, middle: float) -> Message | None:

@@ -93,9 +93,7 @@ def followed_in(standout: Standout, cut: CrossCut, reading: Reading, piece: Stri
     )
 
 
-def _ahead(
-    standout: Standout, cut: CrossCut, path: Array, width: float, least: float = LEAST_MORE_WIDTHS
-) -> Array | None:
+def _ahead(standout: Standout, cut: CrossCut, path: Array, width: float, least: float) -> Array | None:
     """The path and the more of the same beyond its last point, None if there is none.
 
     A path's end may be bent by what lies across, so it is led on by pieces of it that differ in length and place.
@@ -132,9 +130,9 @@ def _end_of_more(more: CrossCut, alike: NDArray[np.bool_], width: float, least: 
 
 def _led_into_picture(standout: Standout, path: Array, width: float, lead: tuple[float, float]) -> tuple[Array, Array]:
     """The path, and what it is led on by beyond its last point as far as the picture goes."""
-    body, outward = straight_body(path, width, lead[0] * width)
+    body, _ = straight_body(path, width, lead[0] * width)
     reach = float(np.hypot(*(path[-1] - body[-1])))
-    led = led_on(body, outward, reach + _BEYOND_WIDTHS * width, width, base=lead[1])
+    led = led_on(body, reach + _BEYOND_WIDTHS * width, width, base=lead[1])
     led, ahead = np.split(led, [len(body) + int(reach)])
     rows, columns = standout.residual.shape[:2]
     inside = np.all((ahead >= 0) & (ahead <= (columns - 1, rows - 1)), axis=1)
@@ -155,7 +153,7 @@ def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
 
 
 def more_beyond(
-    standout: Standout, cut: CrossCut, axes: Axes, others: list[Strip], *, length_px: float | None
+    standout: Standout, cut: CrossCut, axes: Axes, others: list[Strip], *, length_px: float | None, least: float
 ) -> Place | None:
     """The visible end of a strip beyond which the cable goes on: straight on, or nearest to it beyond what hides it.
 
@@ -172,11 +170,13 @@ def more_beyond(
         Other strips of the reading.
     length_px : px or None
         Of the cable; a strip so long has no rest beyond a sheet.
+    least : widths
+        Of what straight on counts as more of it.
     """
     paths = zip(axes, (cut.path[::-1], cut.path), strict=True)
     ends = [(axis, path) for axis, path in paths if axis.kind in ("end", "clamp")]
     for axis, path in ends:
-        if _ahead(standout, cut, path, cut.usual_width) is not None:
+        if _ahead(standout, cut, path, cut.usual_width, least) is not None:
             return axis.center_px
     length, gaps = float(step_lengths(cut.path).sum()), []
     if length_px is not None and length * standout.reduction > _WHOLE_SHARE * length_px:

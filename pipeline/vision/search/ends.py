@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.stats import theilslopes
@@ -23,12 +24,14 @@ from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import Bearing
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
+from pipeline.vision.search.crosscut import SEEN_SHARE
 from pipeline.vision.search.strips import end_direction
 
 _COVER_MARGIN_WIDTHS = 0.1  # widths; the blurred rim of a cover spoils the edges so far beyond its circle
 TRIMMED_WIDTHS = 0.8  # widths; so much of a skeleton's end runs into a corner of the mask and is replaced
 _BORDER_CELLS, _BORDER_WIDTHS = 2.0, 0.25  # cells and widths; so near the border an end is no end of the cable
 _CENTRED_WIDTHS = 0.04  # widths; how far aside of the cable's middle the search ends its path
+_ASIDE_WIDTHS = 1.3  # widths; from the cable's middle to the ground beside its end
 _EDGE_STD_PX = 0.25  # px; what halo, JPEG and grid move an edge, on all rows alike
 
 
@@ -76,7 +79,8 @@ def at_border(place: Sequence[float] | Array, photo: Photo, reduction: int, widt
 def settle_end(axis: Bearing, path: Array, closeup: Standout, width: float) -> tuple[Bearing, Array]:
     """Put an axis that is a visible end where the refined path ends; a free end to a fraction of a pixel.
 
-    The last sections of a path feel the end and are replaced by a parabola that continues the path.
+    The last sections of a path feel the end and are replaced by an arc that continues the path. Where the grey stays
+    the cable's there is no end: it vanishes there, or goes on.
 
     Parameters
     ----------
@@ -92,25 +96,26 @@ def settle_end(axis: Bearing, path: Array, closeup: Standout, width: float) -> t
         return axis, path
     body, outward = straight_body(path, width, 1.5 * TRIMMED_WIDTHS * width)
     reach = max(float((path[-1] - body[-1]) @ outward), 1.0)
-    path = led_on(body, outward, reach, width)
+    path = led_on(body, reach, width)
     settled = replace(axis, center_px=(float(path[-1][0]), float(path[-1][1])))
     if axis.kind == "clamp":
         return settled, path
     across = np.array([-outward[1], outward[0]])
     along = np.arange(-1.5 * width, 1.5 * width + 0.125, 0.25)
-    rows = np.linspace(-0.25, 0.25, 9) * width
+    rows = np.append(np.linspace(-0.25, 0.25, 9), (-_ASIDE_WIDTHS, _ASIDE_WIDTHS)) * width
     points = closeup.to_cells(path[-1]) + along[None, :, None] * outward + rows[:, None, None] * across
     profiles = sampled(closeup.picture[..., 0], points)
-    places = [_half_level(profile, along, width) for profile in profiles]
-    known = np.array([(row, place) for row, place in zip(rows, places, strict=True) if place is not None])
+    aside = median(profiles[-2:, along < -0.6 * width])
+    places = [_half_level(profile, along, width, aside) for profile in profiles[:-2]]
+    known = np.array([(row, place) for row, place in zip(rows[:-2], places, strict=True) if place is not None])
     if len(known) < 5:
-        return settled, path
+        return replace(settled, kind="clamp"), path
     # a slanting cut is a straight line across, and ends the cable where the middle crosses it
     slant, middle = (float(part) for part in theilslopes(known[:, 1], known[:, 0])[:2])
     # rows a quarter width apart share their blur
     uneven = scatter(known[:, 1] - middle - slant * known[:, 0], 0.0) / 2.0
     std = float(np.linalg.norm([uneven, np.hypot(1.0, slant) * _CENTRED_WIDTHS * width, _EDGE_STD_PX]))
-    path = led_on(body, outward, max(reach + middle, 1.0), width)
+    path = led_on(body, max(reach + middle, 1.0), width)
     return replace(settled, center_px=(float(path[-1][0]), float(path[-1][1])), std_px=std), path
 
 
@@ -120,24 +125,35 @@ def onto_curve(axis: Bearing, place: Array, width: float) -> Bearing:
     return replace(axis, center_px=(float(place[0]), float(place[1])), std_px=std)
 
 
-def led_on(body: Array, outward: Array, reach: float, width: float, *, base: float = 4.0) -> Array:
-    """Continue a path (n, 2) by the parabola through its last ``base`` widths, ``reach`` onward, in its unit."""
-    across = np.array([-outward[1], outward[0]])
-    along, aside = (body - body[-1]) @ outward, (body - body[-1]) @ across
-    # counted from the end: a loop may come back beside it
-    last = np.cumprod((along > -base * width)[::-1])[::-1].astype(bool)
-    unit = base * width
-    powers = np.vander(along[last] / unit, 3)
-    parabola = np.linalg.lstsq(powers, aside[last], rcond=None)[0]
-    steps = np.linspace(0.0, reach, max(2, round(reach) + 1))[1:]
-    turned = np.vander(steps / unit, 3) @ parabola
-    return np.vstack([body, body[-1] + steps[:, None] * outward + turned[:, None] * across])
+def led_on(body: Array, reach: float, width: float, *, base: float = 4.0) -> Array:
+    """Continue a path (n, 2) by the arc along its last ``base`` widths, ``reach`` onward, in its unit.
+
+    Its angles tell the arc roughly, for a noisy path; a parabola aside of that is nearest to its points.
+    """
+    s = arc_lengths(body)
+    near = min(int(np.searchsorted(s, s[-1] - base * width)), len(body) - 3)
+    last, s = body[near:], s[near:]
+    angle = np.unwrap(np.arctan2(*np.diff(last, axis=0).T[::-1]))
+    turn = Polynomial.fit(0.5 * (s[1:] + s[:-1]), angle, 1)
+    s = np.append(s, s[-1] + np.linspace(0.0, reach, max(2, round(reach) + 1))[1:])
+    steps = np.diff(s)[:, None] * _direction(turn(0.5 * (s[1:] + s[:-1])))
+    arc = last[0] + np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
+    across = _direction(turn(s) + 0.5 * np.pi)
+    off = ((last - arc[: len(last)]) * across[: len(last)]).sum(axis=1)
+    arc += Polynomial.fit(s[: len(last)], off, 2)(s)[:, None] * across
+    return np.vstack([body, arc[len(last) :]])
 
 
-def _half_level(profile: Array, along: Array, width: float) -> float | None:
-    """Where the grey leaves the cable's for the ground's; None without a clear step."""
+def _direction(angle: Array) -> Array:
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _half_level(profile: Array, along: Array, width: float, aside: float) -> float | None:
+    """Where the grey leaves the cable's for the ground's; None without a step like that to the ground ``aside``."""
     cable, ground = median(profile[along < -0.6 * width]), median(profile[along > 0.6 * width])
-    relief = (profile - ground) / (cable - ground) if abs(cable - ground) > 1e-6 else np.zeros_like(profile)
+    if (cable - ground) * np.sign(cable - aside) <= SEEN_SHARE * abs(cable - aside):
+        return None
+    relief = (profile - ground) / (cable - ground)
     fallen = np.flatnonzero((relief < 0.5) & (along > -0.6 * width))
     if not len(fallen) or relief[i := int(fallen[0]) - 1] < 0.5:
         return None

@@ -13,6 +13,7 @@ from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
+from pipeline.vision.single import trace_photo
 
 WIDTH, SIZE = 16, (560, 1000)
 WHOLE = 0.002
@@ -74,6 +75,20 @@ def test_no_piece_of_the_cable_passes_for_it(across):
     found = find_cable(_photo(across))
     assert isinstance(found, RoughCable)
     assert found.length_px == pytest.approx(_length(), rel=WHOLE)
+
+
+def test_a_strong_bend_is_followed_beyond_a_bolt():
+    """A C of 10 px with a dark bolt on it: what is led on keeps turning as the cable does."""
+    turn = np.linspace(-2.2, 2.2, 400)
+    middle = np.column_stack([200.0 - 75.0 * np.cos(turn), 150.0 + 75.0 * np.sin(turn)])
+    picture = np.full((300, 400), 215.0, np.float32)
+    cv2.polylines(picture, [np.round(middle * 16).astype(np.int32)], False, 40.0, 10, cv2.LINE_AA, 4)
+    u, v = middle[320] * 16
+    cv2.circle(picture, (round(u), round(v)), 13 * 16, 40.0, cv2.FILLED, cv2.LINE_AA, 4)
+    picture = cv2.GaussianBlur(picture, (0, 0), 1.0) + 2.0 * np.random.default_rng(3).standard_normal(picture.shape)
+    found = find_cable(Photo("c.png", np.clip(picture, 0, 255).astype(np.uint8), 8))
+    assert isinstance(found, RoughCable)
+    assert found.length_px == pytest.approx(75.0 * 4.4 + 10.0, rel=0.02)
 
 
 @pytest.mark.parametrize("pitch", [30, 40])
@@ -146,6 +161,28 @@ def test_half_a_cable_of_two_colours_does_not_pass_for_it(first):
 
 def test_another_piece_of_cable_in_line_is_none_of_one_that_is_whole():
     assert isinstance(find_cable(_photo(_papered), cable=Cable(length_px=555.0)), RoughCable)
+
+
+@pytest.mark.parametrize("diameter_px", [None, float(WIDTH)])
+@pytest.mark.parametrize("grey", [215.0, 130.0, 90.0])
+@pytest.mark.parametrize("hidden", [1.0, 2.0])
+@pytest.mark.parametrize("rest", [1.5, 2.5])
+def test_a_short_rest_beyond_a_band_is_traced_or_told(rest, hidden, grey, diameter_px, tmp_path):
+    """A band across the last of a cable, in the ground's colour or another one: it may pass for the cable's end."""
+    end, ahead = _bow()[-1], np.diff(_bow()[[-5, -1]], axis=0)[0]
+    ahead *= WIDTH / np.hypot(*ahead)
+    along, aside = 0.5 * hidden * ahead, 60.0 / WIDTH * ahead[::-1] * (-1.0, 1.0)
+    middle = end + (0.5 - rest) * ahead - along
+    corners = np.array([middle + u * along + v * aside for u, v in ((-1, -1), (-1, 1), (1, 1), (1, -1))])
+
+    def across(picture):
+        cv2.fillPoly(picture, [np.round(corners * 16).astype(np.int32)], grey, cv2.LINE_AA, 4)
+        return picture
+
+    assert cv2.imwrite(str(tmp_path / "bow.png"), _photo(across).pixels)
+    line = trace_photo(tmp_path / "bow.png", diameter_px=diameter_px)
+    told = isinstance(line, Rejected) or any(finding.level == "warning" for finding in line.findings)
+    assert told or line.traced_length_m == pytest.approx(_length(), rel=WHOLE)
 
 
 def test_a_stroke_of_print_is_no_end():

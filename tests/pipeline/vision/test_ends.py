@@ -10,7 +10,7 @@ from pipeline.vision.centerline.measurement import Followed, follow_cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
-from pipeline.vision.search.ends import without_specks
+from pipeline.vision.search.ends import led_on, without_specks
 from pipeline.vision.segmentation import find_cable
 
 
@@ -29,6 +29,16 @@ def test_a_cut_end_is_as_sure_as_its_edge(slant: float) -> None:
     for axis, place in ((followed.rough.left, first), (followed.rough.right, last)):
         assert axis.std_px < 0.5
         assert np.hypot(*np.subtract(axis.center_px, (place, 100.3))) < 2.0 * axis.std_px
+
+
+@pytest.mark.parametrize("base", [4.0, 10.0])
+def test_a_path_is_led_on_as_it_turns(base: float) -> None:
+    """Along a circle of 7.5 widths: a parabola through the last ten is off by two widths six widths on."""
+    width, turn = 10.0, np.linspace(0.0, 2.4, 181)
+    path = 75.0 * np.column_stack([np.cos(turn), np.sin(turn)]) + np.random.default_rng(1).normal(0.0, 0.02, (181, 2))
+    led = led_on(path, 6.0 * width, width, base=base)
+    assert np.hypot(*led[-1]) == pytest.approx(75.0, abs=0.2 * width)
+    assert np.hypot(*(led[-1] - led[180])) == pytest.approx(150.0 * np.sin(0.4), abs=0.1 * width)
 
 
 def test_what_is_no_longer_than_the_gap_that_parts_it_from_a_strip_is_none_of_it() -> None:
