@@ -22,20 +22,9 @@ from PIL import ImageOps
 from pipeline.messages import Message, by_system
 from pipeline.records import Rejected
 from pipeline.settings.vision.photo import PhotoSettings
-from pipeline.vision.photo_file import BROKEN, Header, is_sound, is_whole, opened, read_header
+from pipeline.vision.photo_file import BROKEN, is_sound, is_whole, opened, read_header
 
 Pixels = NDArray[np.uint8 | np.uint16]
-
-# EXIF orientation -> whether the stored picture is mirrored, left for right, and OpenCV's rotation after that
-_TURNS = {
-    2: (True, None),
-    3: (False, cv2.ROTATE_180),
-    4: (True, cv2.ROTATE_180),
-    5: (True, cv2.ROTATE_90_COUNTERCLOCKWISE),
-    6: (False, cv2.ROTATE_90_CLOCKWISE),
-    7: (True, cv2.ROTATE_90_CLOCKWISE),
-    8: (False, cv2.ROTATE_90_COUNTERCLOCKWISE),
-}
 
 
 @dataclass(frozen=True)
@@ -131,7 +120,7 @@ def decode_photo(data: bytes, settings: PhotoSettings, *, name: str) -> Photo | 
         return Rejected(name, Message("photo/too-small", side_px=side, limit_px=settings.min_side_px))
     if not is_whole(data, header.kind):
         return Rejected(name, Message("photo/truncated"))
-    pixels = _decode(data, header) if is_sound(data, header.kind) else None
+    pixels = _decode(data) if is_sound(data, header.kind) else None
     if pixels is None:
         return Rejected(name, Message("photo/unreadable.damaged", kind=header.kind))
     return Photo(name=name, pixels=pixels, bit_depth=_bit_depth(pixels))
@@ -186,25 +175,17 @@ def _mean_over(pixels: Pixels, size: tuple[int, int]) -> Pixels:
     return np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), pixels.dtype)
 
 
-def _decode(data: bytes, header: Header) -> Pixels | None:
+def _decode(data: bytes) -> Pixels | None:
     try:
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        # turned by its orientation, without alpha
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
     except cv2.error:
         picture = None
-    # IMREAD_UNCHANGED leaves jpg and png as stored; the tif decoder of OpenCV turns them itself.
-    orientation = 1 if header.kind == "tif" else header.orientation
     if picture is None:
         return _decode_by_pillow(data)
     if picture.dtype not in (np.uint8, np.uint16):
         return None
-    pixels: Pixels = np.asarray(picture, np.uint8 if picture.dtype == np.uint8 else np.uint16)
-    if pixels.ndim == 3:
-        pixels = pixels[..., 0] if pixels.shape[2] in (1, 2) else pixels[..., :3]
-    # A copy in place of a view: OpenCV refuses interleaved views, and the four-channel original is freed.
-    pixels = np.ascontiguousarray(pixels)
-    mirrored, rotation = _TURNS.get(orientation, (False, None))
-    pixels = np.asarray(cv2.flip(pixels, 1), pixels.dtype) if mirrored else pixels
-    return pixels if rotation is None else np.asarray(cv2.rotate(pixels, rotation), pixels.dtype)
+    return np.ascontiguousarray(picture)
 
 
 def _decode_by_pillow(data: bytes) -> Pixels | None:

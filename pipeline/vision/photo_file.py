@@ -1,4 +1,4 @@
-"""What the bytes of a picture say before anything is decoded: kind, size, orientation, and whether the file is whole.
+"""What the bytes of a picture say before anything is decoded: kind, size, and whether the file is whole.
 
 A decoder believes what a file claims: one wrong length in a png of 11 kB makes it ask for gigabytes, and a file that
 was cut or changed comes back as a picture with grey areas. Sizes are read by Pillow's readers of each kind, which
@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from PIL import Image, ImageFile
+from PIL import ImageFile
 from PIL.BmpImagePlugin import BmpImageFile
 from PIL.JpegImagePlugin import JpegImageFile
 from PIL.PngImagePlugin import PngImageFile
@@ -22,7 +22,6 @@ from PIL.TiffImagePlugin import TiffImageFile
 
 from pipeline.vision.guard import UNFORESEEN
 
-ORIENTATION_TAG = 0x0112
 PNG_BEGIN = b"\x89PNG\r\n\x1a\n"
 READERS: tuple[tuple[bytes, str, type[ImageFile.ImageFile]], ...] = (
     (PNG_BEGIN, "png", PngImageFile),
@@ -37,12 +36,11 @@ BROKEN = (*UNFORESEEN, EOFError, OSError, SyntaxError, struct.error)
 
 @dataclass(frozen=True)
 class Header:
-    """Kind (png, jpg, bmp, tif), width and height in px as stored, EXIF orientation (1 to 8)."""
+    """Kind (png, jpg, bmp, tif), width and height in px as stored."""
 
     kind: str
     width: int
     height: int
-    orientation: int
 
 
 def opened(data: bytes) -> ImageFile.ImageFile | None:
@@ -60,7 +58,7 @@ def opened(data: bytes) -> ImageFile.ImageFile | None:
 
 
 def read_header(data: bytes) -> Header | None:
-    """Kind, size and orientation without decoding; None if no reader knows the file."""
+    """Kind and size without decoding; None if no reader knows the file."""
     with warnings.catch_warnings():
         # Damaged metadata is no reason to refuse the pixels.
         warnings.simplefilter("ignore", UserWarning)
@@ -70,21 +68,9 @@ def read_header(data: bytes) -> Header | None:
                 return None
             with image:
                 kind = next(kind for begin, kind, _ in READERS if data.startswith(begin))
-                return Header(kind, image.width, image.height, _orientation(image))
+                return Header(kind, image.width, image.height)
         except BROKEN:
             return None
-
-
-def _orientation(image: ImageFile.ImageFile) -> int:
-    try:
-        if image.format == "PNG":
-            # Pillow's getexif decodes a png without EXIF to look behind the pixels; cameras write it in front.
-            exif = Image.Exif()
-            exif.load(image.info.get("exif", b""))
-            return int(exif.get(ORIENTATION_TAG, 1))
-        return int(image.getexif().get(ORIENTATION_TAG, 1))
-    except BROKEN:
-        return 1
 
 
 def is_whole(data: bytes, kind: str) -> bool:
