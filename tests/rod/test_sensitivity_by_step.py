@@ -1,4 +1,4 @@
-"""Derivatives by what has no name: friction in the cable, bearings, forces and moments given step by step; a law's knot.
+"""Derivatives by what has no name: friction in the cable, what is given step by step, a knot of the law.
 
 Against difference quotients of whole simulations, there and back.
 """
