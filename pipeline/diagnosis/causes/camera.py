@@ -110,8 +110,8 @@ class CameraTilt(Cause):
             setting="steep",
         )
         return (
-            Variant("along the chord", at=0.0),
-            Variant("across the chord", at=0.5 * np.pi),
+            Variant("along the chord", at=0.0, component=True),
+            Variant("across the chord", at=0.5 * np.pi, component=True),
             # what grows with the square of the tilt does not change its sign, so no trace tells of the others
             *(
                 replace(steep, at=at, width=way * steep.width, trace=trace)

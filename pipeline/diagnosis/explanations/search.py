@@ -35,8 +35,9 @@ from rod.inverse.base_fit import settled
 from rod.inverse.extension import Term
 from rod.inverse.fit import FITS, Fit, fit_from
 
-MATTERS = 0.1
-"""Probability of a cause by the linear model from which causes are refitted at all: small effects are linear ones."""
+MATTERS = 2.0
+"""How much likelier than the base model the linear model makes a cause from which on causes are refitted at all. It has
+each form alone; what is no likelier so is no cause with all its forms either."""
 
 LIKELIEST = 4
 """Refits, the likeliest first, that are weighed with something else besides; single causes that pairs begin with."""
@@ -258,9 +259,8 @@ class Search:
 def searched(bench: Workbench, known: Refits | None = None) -> Search:
     """All hypotheses about a specimen that are worth it, weighed; ``known`` causes are not refitted again."""
     search = Search(bench, known)
-    first = search.posterior
-    silent = all(one.probability < MATTERS for one in first.believed if one.causes)
-    silent = silent and first.word == "base"
+    nothing, *causes = search.hypotheses
+    silent = search.posterior.word == "base" and all(one.plain < nothing.plain + np.log(MATTERS) for one in causes)
     about = beside_usual(bench.base, bench.suspicion)
     hidden = hidden_pair(about) if silent else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise

@@ -45,8 +45,10 @@ from pipeline.diagnosis.posterior.unknowns import (
     solved_for,
     solved_once,
 )
+from rod.inverse.cause import Cause
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
+from rod.inverse.prediction import Facts
 
 Array = NDArray[np.float64]
 
@@ -242,30 +244,43 @@ def _amounts(fitted: Fit, solved: Solved) -> Array:
     told = solved.flat > top[rest.astype(int)] - NOTHING
     value = (fitted.vector[solved.amounts] + solved.move)[told]
     covariance = np.broadcast_to(solved.covariance[:, :, :, None], (*solved.move.shape, len(owner)))[told]
-    for cause in {cause.name: cause for cause in owner}.values():
-        own = [k for k, other in enumerate(owner) if other is cause]
-        joint = covariance[:, own][..., own]
-        total[told] += _size_unknown(value[:, own], joint, cause.plausible(extension.facts), cause.sign)
+    causes = list(dict.fromkeys(owner))
+    causes.sort(key=lambda cause: -owner.count(cause))  # the last one is the cheapest
+    own = [[k for k, other in enumerate(owner) if other is cause] for cause in causes]
+    total[told] = _sizes_unknown(value, covariance, [*zip(causes, own, strict=True)], extension.facts)
     return total
 
 
-def _size_unknown(value: Array, covariance: Array, plausible: float, sign: int) -> Array:
-    """Log mean over s of N(value; 0, covariance + s^2 plausible^2), times 2 Phi for each amount of known sign.
+def _sizes_unknown(value: Array, covariance: Array, parts: Sequence[tuple[Cause, list[int]]], facts: Facts) -> Array:
+    """Log mean over the sizes s of all causes of N(value; 0, covariance + s^2 plausible^2), times 2 Phi, (n,).
 
-    Shapes: value (..., k), covariance (..., k, k).
+    Parameters
+    ----------
+    value, covariance : (n, k), (n, k, k)
+        Estimates of the amounts and how well they are known.
+    parts : list of (cause, positions of its amounts)
+        Two causes may be known together alone, so the second one is weighed given the first one at each size.
+    facts : Facts
     """
-    sizes = (SIZES * plausible) ** 2
-    if value.shape[-1] == 1:
-        return _one_size_unknown(value[..., 0], covariance[..., 0, 0], sizes, sign)
-    wide = covariance[..., None, :, :] + sizes[:, None, None] * np.eye(value.shape[-1])
-    there = np.linalg.solve(wide, value[..., None, :, None])[..., 0]
-    log = -0.5 * (np.sum(value[..., None, :] * there, axis=-1) + np.linalg.slogdet(2.0 * np.pi * wide)[1])
-    if sign:
-        mean = sizes[:, None] * there
-        # the variance of each given s: prior minus what the data take of it
-        left = sizes[:, None] * (1.0 - sizes[:, None] * np.einsum("...ii->...i", np.linalg.inv(wide)))
-        log = log + np.sum(np.log(2.0) + log_ndtr(sign * mean / np.sqrt(np.maximum(left, 1e-300))), axis=-1)
-    return np.asarray(log_sum(np.moveaxis(log, -1, 0)) - np.log(len(SIZES)))
+    (cause, own), *others = parts
+    sizes, mine = (SIZES * cause.plausible(facts)) ** 2, covariance[:, own][..., own]
+    if not others and len(own) == 1:
+        return _one_size_unknown(value[:, own[0]], mine[:, 0, 0], sizes, cause.sign)
+    logs = []
+    for size in sizes:
+        wide = np.linalg.inv(mine + size * np.eye(len(own)))
+        there = (wide @ value[:, own, None])[..., 0]
+        log = 0.5 * (np.linalg.slogdet(wide)[1] - np.sum(value[:, own] * there, axis=1) - len(own) * LOG_2PI)
+        if cause.sign:
+            # the variance of each given s: prior minus what the data take of it
+            left = size * (1.0 - size * np.einsum("nii->ni", wide))
+            log += np.sum(np.log(2.0) + log_ndtr(cause.sign * size * there / np.sqrt(np.maximum(left, 1e-300))), axis=1)
+        if others:
+            across = covariance[:, :, own]
+            moved = value - (across @ there[..., None])[..., 0]
+            log += _sizes_unknown(moved, covariance - across @ wide @ across.swapaxes(1, 2), others, facts)
+        logs.append(log)
+    return np.asarray(log_sum(np.array(logs)) - np.log(len(SIZES)))
 
 
 def _with_each(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array) -> Array:
