@@ -14,8 +14,7 @@ Units: px.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +39,23 @@ lies two of its own radii ahead.
 _LOST_CABLE_REACH = 3.1  # radii; at the others: as far as it is searched
 
 
+class _LostEnd(NamedTuple):
+    """Where a cable is lost on a photo, and the circles of all sizes that are seen nearly all round there."""
+
+    place: Array
+    circles: list[Circle]
+
+    def as_large(self, radius: float, most: float) -> Circle | None:
+        """The circle most nearly of some radius, ``most`` radii from the end; None if there is none about as large."""
+        near = [circle for circle in self.circles if self.ahead(circle) <= most]
+        found = min(near, key=lambda circle: abs(circle.radius - radius), default=None)
+        return None if found is None or abs(found.radius - radius) > SAME_RADIUS * radius else found
+
+    def ahead(self, circle: Circle) -> float:
+        """Distance of a circle's centre from the end of the cable, in radii."""
+        return float(np.hypot(*(np.array(circle.center) - self.place)) / circle.radius)
+
+
 def cover_radius(seen: Iterable[tuple[Photo, RoughCable]]) -> float | None:
     """Radius of the covers under which the cable's ends vanish.
 
@@ -51,29 +67,19 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]]) -> float | None:
     Returns
     -------
     px or None
-        None unless one radius fits both ends on every photo.
+        None unless one radius fits both ends on every photo: that of the largest circle that is seen at all ends.
     """
-    ends = [_LostEnd(photo, end, 2.0 * cable.half_width_px) for photo, cable in seen for end in visible_ends(cable)]
-    if not ends:
-        return None
-    return _largest(ends, _ON_RIM, _ON_RIM) or _largest(ends, _LOST_CABLE_REACH, _LOST_BEFORE_RIM)
-
-
-def _largest(ends: list[_LostEnd], most: float, nearest: float) -> float | None:
-    """Radius of the largest circle that is seen at all ends, nearly all round, wherever each was lost before it.
-
-    Each was lost ``most`` radii from its centre at most, and one of them ``nearest``. It is sought in all sizes at the
-    first end, in those that this tells at the others.
-    """
-    for first in sorted(ends[0].circles, key=lambda circle: -circle.radius):
-        found: list[Circle] = []
-        for end in ends:
-            circle = end.as_large(first.radius) if found else first
-            if circle is None or end.ahead(circle) > most:
-                break
-            found.append(circle)
-        if len(found) == len(ends) and min(map(_LostEnd.ahead, ends, found)) <= nearest:
-            return median([circle.radius for circle in found])
+    ends = [
+        _LostEnd(end.place, _circles(photo, end, 2.0 * cable.half_width_px))
+        for photo, cable in seen
+        for end in visible_ends(cable)
+    ]
+    for most, nearest in ((_ON_RIM, _ON_RIM), (_LOST_CABLE_REACH, _LOST_BEFORE_RIM)):
+        for first in sorted(ends[0].circles if ends else [], key=lambda circle: -circle.radius):
+            alike = [(end, end.as_large(first.radius, most)) for end in ends]
+            found = [(end.ahead(circle), circle.radius) for end, circle in alike if circle is not None]
+            if len(found) == len(ends) and min(found)[0] <= nearest:
+                return median([radius for _, radius in found])
     return None
 
 
@@ -84,39 +90,11 @@ def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
     return CableEnd(body[0], end_direction(body[::-1], width)), CableEnd(body[-1], end_direction(body, width))
 
 
-@dataclass
-class _LostEnd:
-    """Where a cable of some width is lost on a photo, and what is round there."""
-
-    photo: Photo
-    end: CableEnd
-    width_px: float
-
-    @cached_property
-    def circles(self) -> list[Circle]:
-        """Circles of all sizes seen nearly all round."""
-        return [circle for circle in map(self.near, self.sizes()) if circle is not None]
-
-    def as_large(self, radius: float) -> Circle | None:
-        """The first circle about as large as another end's."""
-        sizes = sorted(self.sizes(), key=lambda size: abs(size - radius))[:3]
-        circles = (circle for circle in map(self.near, sizes) if circle is not None)
-        return next((circle for circle in circles if abs(circle.radius - radius) <= SAME_RADIUS * radius), None)
-
-    def ahead(self, circle: Circle) -> float:
-        """Distance of a circle's centre from the end of the cable, in radii."""
-        return float(np.hypot(*(np.array(circle.center) - self.end.place)) / circle.radius)
-
-    def near(self, radius: float) -> Circle | None:
-        """Circle of about some radius that is a cover for sure."""
-        expected = Radius(radius, 0.5 * SEARCH_RADII)
-        circle = find_rim(self.photo, self.end, expected, self.width_px)
-        sure = circle is not None and circle.rim >= SURE_RIM and circle.radius_std <= SAME_RADIUS * circle.radius
-        return circle if sure else None
-
-    def sizes(self) -> Array:
-        """Radii tried."""
-        low, high = _COVER_RADII_WIDTHS
-        # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
-        steps = int(np.ceil(np.log(high / low) / np.log(1.0 + SEARCH_RADII)))
-        return np.asarray(np.geomspace(low, high, steps + 1) * self.width_px, np.float64)
+def _circles(photo: Photo, end: CableEnd, width_px: float) -> list[Circle]:
+    """Circles of all sizes about the end of a cable, covers for sure: seen nearly all round, and of a sure radius."""
+    low, high = _COVER_RADII_WIDTHS
+    # Each try covers the radii within half a step: neighbours are as far apart as a rim is searched along its rays.
+    steps = int(np.ceil(np.log(high / low) / np.log(1.0 + SEARCH_RADII)))
+    sizes = np.geomspace(low, high, steps + 1) * width_px
+    found = (find_rim(photo, end, Radius(float(size), 0.5 * SEARCH_RADII), width_px) for size in sizes)
+    return [one for one in found if one and one.rim >= SURE_RIM and one.radius_std <= SAME_RADIUS * one.radius]
