@@ -17,12 +17,12 @@ cable): 0.005 px where finders by gradients or by a response leave 0.03 to 0.15 
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.special import erf
 
 from pipeline.records import Array
 
-_CORNER_STEP_PX = 1e-3  # px; a tenth of what noise leaves at best
-_ROUNDS = 15
+_CORNER_FTOL = 1e-4  # of the squared misfit; what a further step would gain is a hundredth of what noise leaves
 _CORNER_REACH = 0.4  # squares; how far from a corner its edges are fitted: before the next corner's
 _CORNER_MARGIN = 0.9  # share of the white margin beside a ChArUco marker; the rest is the marker's blur
 _CORNER_REACH_PX = 20.0  # px; longer edges hardly help, and a lens bends them: 1 % of barrel by 0.005 px over 20 px
@@ -58,26 +58,27 @@ def refine_corners(grey: Array, uv: Array, cells: Array, marker_share: float = 0
 def _refined(grey: Array, start: Array, cell: Array, margin: float) -> Array:
     lost = np.full(2, np.nan)
     place, value = _pixels(grey, start, cell, margin)
-    square = float(np.hypot(*cell).min())
     if len(value) < _CORNER_PIXELS:
         return lost
-    at = start.copy()
-    turn = np.arctan2(cell[1], cell[0])
-    log_sigma = float(np.log(_CORNER_BLUR_PX))
-    for _ in range(_ROUNDS):
-        slopes, linear = _linearised(place - at, turn, float(np.exp(log_sigma)))
-        amount, *_ = np.linalg.lstsq(linear, value, rcond=None)
-        left = value - linear @ amount
-        step, *_ = np.linalg.lstsq(np.column_stack([amount[1] * slopes, linear]), left, rcond=None)
-        # half of the blur at a time: beyond it the edge's slope says nothing about how far the edge is
-        move = np.clip(step[:2], -1.0, 1.0)
-        at, turn = at + move, turn + np.clip(step[2:4], -0.1, 0.1)
-        log_sigma += float(np.clip(step[4], -0.5, 0.5))
-        if np.abs(move).max() < _CORNER_STEP_PX:
-            break
-    clear = abs(amount[1]) > _CORNER_CONTRAST * float(np.std(left))
-    stayed = np.hypot(*(at - start)) < _CORNER_MOVE * square and np.exp(log_sigma) < _CORNER_REACH * square
-    return at if clear and stayed and np.abs(move).max() < 10.0 * _CORNER_STEP_PX else lost
+
+    def fitted(x: Array) -> tuple[Array, float]:
+        """Residuals ``(n,)`` and c1 for a corner, directions of its edges, and log sigma."""
+        d, normal = place - x[:2], np.stack([-np.sin(x[2:4]), np.cos(x[2:4])])
+        edge = erf(d @ normal / (np.sqrt(2.0) * np.exp(x[4])))
+        linear = np.column_stack([np.ones(len(d)), edge.prod(axis=1), d])
+        amount = np.linalg.solve(linear.T @ linear + 1e-9 * np.eye(4), linear.T @ value)
+        return value - linear @ amount, float(amount[1])
+
+    def misfit(x: Array) -> Array:
+        return fitted(x)[0]
+
+    guess = np.array([*start, *np.arctan2(cell[1], cell[0]), np.log(_CORNER_BLUR_PX)])
+    fit = least_squares(misfit, guess, method="lm", ftol=_CORNER_FTOL)
+    left, step = fitted(fit.x)
+    square = float(np.hypot(*cell).min())
+    clear = abs(step) > _CORNER_CONTRAST * float(np.std(left))
+    stayed = np.hypot(*(fit.x[:2] - start)) < _CORNER_MOVE * square and np.exp(fit.x[4]) < _CORNER_REACH * square
+    return np.asarray(fit.x[:2]) if fit.success and clear and stayed else lost
 
 
 def _pixels(grey: Array, start: Array, cell: Array, margin: float) -> tuple[Array, Array]:
@@ -95,14 +96,3 @@ def _pixels(grey: Array, start: Array, cell: Array, margin: float) -> tuple[Arra
     inside = (ab < reach).all(axis=1) & (ab.min(axis=1) < margin)
     place = place[inside]
     return place, np.asarray(grey[place[:, 1].astype(int), place[:, 0].astype(int)], np.float64)
-
-
-def _linearised(d: Array, turn: Array, sigma: float) -> tuple[Array, Array]:
-    """Slopes ``(n, 5)`` of the product of both edges by corner, directions, log sigma; its linear terms ``(n, 4)``."""
-    along = np.stack([np.cos(turn), np.sin(turn)])
-    normal = np.stack([-along[1], along[0]])
-    t = d @ normal / sigma
-    edge = np.asarray(erf(t / np.sqrt(2.0)), np.float64)
-    rise = np.sqrt(2.0 / np.pi) * np.exp(-0.5 * t * t) * edge[:, ::-1]
-    slopes = np.column_stack([-(rise @ normal.T) / sigma, -rise * (d @ along) / sigma, -(rise * t).sum(axis=1)])
-    return slopes, np.column_stack([np.ones(len(d)), edge[:, 0] * edge[:, 1], d])
