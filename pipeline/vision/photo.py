@@ -118,7 +118,7 @@ def decode_photo(data: bytes, settings: PhotoSettings, *, name: str) -> Photo | 
     side = min(header.width, header.height)
     if side < settings.min_side_px:
         return Rejected(name, Message("photo/too-small", side_px=side, limit_px=settings.min_side_px))
-    if not is_whole(data, header.kind):
+    if not is_whole(data, header):
         return Rejected(name, Message("photo/truncated"))
     pixels = _decode(data) if is_sound(data, header.kind) else None
     if pixels is None:

@@ -36,11 +36,12 @@ BROKEN = (*UNFORESEEN, EOFError, OSError, SyntaxError, struct.error)
 
 @dataclass(frozen=True)
 class Header:
-    """Kind (png, jpg, bmp, tif), width and height in px as stored."""
+    """Kind (png, jpg, bmp, tif), width and height in px as stored; bytes that tell it, up to the pixels of a jpg."""
 
     kind: str
     width: int
     height: int
+    length: int
 
 
 def opened(data: bytes) -> ImageFile.ImageFile | None:
@@ -68,20 +69,19 @@ def read_header(data: bytes) -> Header | None:
                 return None
             with image:
                 kind = next(kind for begin, kind, _ in READERS if data.startswith(begin))
-                return Header(kind, image.width, image.height)
+                return Header(kind, image.width, image.height, image.fp.tell() if image.fp else 0)
         except BROKEN:
             return None
 
 
-def is_whole(data: bytes, kind: str) -> bool:
+def is_whole(data: bytes, header: Header) -> bool:
     """True unless the file was cut."""
-    if kind == "jpg":
+    if header.kind == "jpg":
         # The end mark cannot occur inside the coded picture, but a thumbnail before it has one of its own.
-        start = _start_of_scan(data)
-        return start is not None and data.find(b"\xff\xd9", start) >= 0
-    if kind == "png":
+        return data.find(b"\xff\xd9", header.length) >= 0
+    if header.kind == "png":
         return data.rfind(b"IEND") >= 0
-    if kind == "bmp":
+    if header.kind == "bmp":
         return len(data) >= int.from_bytes(data[10:14], "little") + 1
     return True
 
@@ -106,13 +106,3 @@ def _png_chunks(data: bytes) -> Iterator[bool]:
         ancillary = bool(name[0] & 0x20)  # small first letter: a remark, no part of the picture
         yield ancillary or zlib.crc32(view[place + 4 : end]) == int.from_bytes(data[end : end + 4], "big")
         place = end + 4
-
-
-def _start_of_scan(data: bytes) -> int | None:
-    place = 2
-    while place + 4 <= len(data) and data[place] == 0xFF:
-        marker = data[place + 1]
-        if marker == 0xDA:
-            return place
-        place += 1 if marker == 0xFF else 2 + int.from_bytes(data[place + 2 : place + 4], "big")
-    return None
