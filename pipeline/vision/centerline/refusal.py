@@ -85,7 +85,8 @@ def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: f
     One cover that is surely seen may be passed beside: not every cable runs through the axis of its bearing.
     """
     axes = rough.axes
-    radii = feet_of_axes(fit, chord)[1] / (0.5 * middle) * [axis.kind != "given" for axis in axes]
+    told = [axis.radius_px is not None or axis.kind in ("end", "clamp") for axis in axes]
+    radii = feet_of_axes(fit, chord)[1] / (0.5 * middle) * told
     wrong = [radius for radius, axis in zip(radii, axes, strict=True) if radius > _BESIDE_DOUBTED and not axis.sure]
     wrong += [radii.min()] if radii.min() > _BESIDE_COVER else []
     key = "photo/bearing.beside-cover" if chord.marked else "photo/outline.beside-end"
