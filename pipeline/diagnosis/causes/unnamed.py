@@ -11,8 +11,10 @@ And forces may act that no model has, as they come and go over the steps, from t
 of order o, normal about nothing, of a standard deviation that falls with 1 / (1 + o):
 
 moments         at one bearing or both: a stop, a cable that is led in
-forces          across the chord, at a place: a support that is touched, a tether; or along the cable, in one to four
-                half waves, as likely each: a pad, a magnet
+forces          across the chord, at a place: a support that is touched, a tether
+bends           all along the cable, by moments in half waves: loads of one to four half waves, as likely each (a pad, a
+                magnet, a table that rubs), have moments M'' = q that fall with the square of their number. A moment M
+                bends the cable as a rest that is moved by M / f_EI does, and is told as that curvature
 
 None has a name in the catalogue, so what it explains is something else; but f_EI beside it can be told, and where
 and when it acts.
@@ -35,14 +37,14 @@ from rod.inverse.prediction import Facts, Model
 Array = NDArray[np.float64]
 
 SIZES = (0.01, 0.003, 0.03)
-"""Of the largest force or moment, their standard deviation: steps of a factor 3.3, over which a normal density hardly
-changes, from what is just seen to what is another experiment; the middle one is tried first."""
+"""Of the largest force, moment or bend, their standard deviation: steps of a factor 3.3, over which a normal density
+hardly changes, from what is just seen to what is another experiment; the middle one is tried first."""
 
 SHARE = 0.25
 """Of the probability of something else beforehand: of what begins between two holds, and of unknown forces."""
 
 WAVES = {f"{k} half waves": float(k) for k in (1, 2, 3, 4)}
-"""Forms of forces along the cable."""
+"""Forms of moments along the cable, and the number of their half waves."""
 
 POINTS = {f"{u:.1f}": u for u in (0.1, 0.3, 0.5, 0.7, 0.9)}
 """Shares of the length near which one may act."""
@@ -88,7 +90,7 @@ class OtherRest(_Begun):
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount`` to K0 from the step ``at`` on."""
-        return _with_rest(model, amount * self.course(variant, facts))
+        return _with_rest(model, np.outer(amount * self.course(variant, facts), np.ones_like(_joints(model))))
 
 
 class OtherStiffness(_Begun):
@@ -135,11 +137,12 @@ class _Unknown(Cause):
     def chance(self, variant: Variant, facts: Facts) -> float:
         """Probability beforehand of one place, size and begin, given that something else acts."""
         begins = max(len(facts.pushed) - 1, 1) if variant.width else 1
-        return 0.25 * SHARE / len(self.places) / len(SIZES) / begins
+        return 0.5 * SHARE / len(UNKNOWN) / len(self.places) / len(SIZES) / begins
 
     def ways(self, facts: Facts, labels: Sequence[str], size: float) -> tuple[Term, ...]:
         """The terms of forces or moments at all of these places together, of one of `SIZES`."""
-        known = {(label, o): size / (1 + o) for o in range(len(facts.branch)) for label in labels}
+        orders = range(len(facts.branch))
+        known = {(label, o): size * WAVES.get(label, 1.0) ** -2.0 / (1 + o) for o in orders for label in labels}
         return tuple(Term(self, Variant(label, at=float(o), known=std)) for (label, o), std in known.items())
 
     def since(self, terms: Sequence[Term], facts: Facts) -> Iterator[tuple[Term, ...]]:
@@ -181,30 +184,41 @@ class UnknownMoments(_Unknown):
         return replace(model, bending=replace(model.bending, moments_by_step=more if given is None else given + more))
 
 
+class UnknownBends(_Unknown):
+    """Moments all along the cable."""
+
+    name = "unnamed.bends"
+    unit = "1/m"
+    places: ClassVar = {"unnamed.along": (*WAVES,)}
+
+    def plausible(self, facts: Facts) -> float:
+        """The range of curvatures, of which shares are tried."""
+        return facts.curvature_scale
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Move the rest by ``amount`` along a half wave, as its course says."""
+        wave = np.sin(WAVES[variant.label] * np.pi * _joints(model))
+        return _with_rest(model, np.outer(amount * self.course(variant, facts), wave))
+
+
 class UnknownForces(_Unknown):
-    """Forces across the chord: along the cable, or at a place."""
+    """Forces across the chord at a place."""
 
     name = "unnamed.forces"
     unit = "N"
-    places: ClassVar = {"unnamed.along": (*WAVES,), **{f"unnamed.at {label}": (label,) for label in POINTS}}
+    places: ClassVar = {f"unnamed.at {label}": (label,) for label in POINTS}
 
     def plausible(self, facts: Facts) -> float:
         """The largest force, of which shares are tried."""
         return facts.force_scale
 
     def ways(self, facts: Facts, labels: Sequence[str], size: float) -> tuple[Term, ...]:
-        """The terms of forces at all of these places together, and where near a place they act."""
-        terms = super().ways(facts, labels, size)
-        return terms if labels[0] in WAVES else (*terms, Term(PLACE, Variant(labels[0], known=1.0)))
+        """The terms of forces near a place, and where they act."""
+        return *super().ways(facts, labels, size), Term(PLACE, Variant(labels[0], known=1.0))
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Push the cable by ``amount``, as its course says; a half wave's is the force of one that points one way."""
-        joints = _joints(model)
-        if variant.label in WAVES:
-            along = 0.5 * np.pi * np.sin(WAVES[variant.label] * np.pi * joints) / (len(joints) - 1)
-        else:
-            along = _at(POINTS[variant.label], joints)
-        across = np.outer(amount * self.course(variant, facts), along)
+        """Push the cable by ``amount``, as its course says."""
+        across = np.outer(amount * self.course(variant, facts), _at(POINTS[variant.label], _joints(model)))
         return _pushed(model, np.stack([np.zeros_like(across), across], axis=2), model.bending.forces_by_step)
 
 
@@ -246,15 +260,14 @@ def _pushed(model: Model, forces: Array, beside: Array | None = None) -> Model:
     return replace(model, bending=replace(model.bending, forces_by_step=forces if beside is None else beside + forces))
 
 
-def _with_rest(model: Model, by_step: Array) -> Model:
-    """The model whose rest is moved at each step (steps,), 1/m."""
-    joints, given = len(model.bending.rod.section.pre_curvature), model.bending.grown
-    more = np.outer(by_step, np.ones(joints))
+def _with_rest(model: Model, more: Array) -> Model:
+    """The model whose rest is moved at each step and joint by (steps, n) 1/m."""
+    given = model.bending.grown
     return replace(model, bending=replace(model.bending, grown=more if given is None else given + more))
 
 
 OTHER_STIFFNESS = OtherStiffness()
 BEGUN = (OtherRest(), OTHER_STIFFNESS, OtherLength())
 PLACE = PlaceOfForce()
-UNKNOWN: tuple[UnknownMoments | UnknownForces, ...] = (UnknownMoments(), UnknownForces())
+UNKNOWN: tuple[UnknownMoments | UnknownForces | UnknownBends, ...] = (UnknownMoments(), UnknownForces(), UnknownBends())
 UNNAMED: tuple[_Begun | _Unknown | PlaceOfForce, ...] = (*BEGUN, *UNKNOWN, PLACE)

@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.unnamed import BEGUN, SIZES, UNKNOWN, UnknownForces, UnknownMoments
+from pipeline.diagnosis.causes.unnamed import BEGUN, SIZES, UNKNOWN, UnknownBends, UnknownForces, UnknownMoments
 from pipeline.diagnosis.explanations.candidates import LEAST, candidates, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
@@ -29,15 +29,11 @@ from pipeline.diagnosis.fits.search import Suspicion, beside_usual, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
-from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, Posterior, posterior
+from pipeline.diagnosis.posterior.hypotheses import ALIKE, SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import Weighed, refitted, weighed
 from rod.inverse.base_fit import settled
 from rod.inverse.extension import Term
 from rod.inverse.fit import FITS, Fit, fit_from
-
-MATTERS = 2.0
-"""How much likelier than the base model the linear model makes a cause from which on causes are refitted at all. It has
-each form alone; what is no likelier so is no cause with all its forms either."""
 
 LIKELIEST = 4
 """Refits, the likeliest first, that are weighed with something else besides; single causes that pairs begin with."""
@@ -214,23 +210,21 @@ class Search:
             since = [k for k in loud if k is not None and about.statistic[k] ** 2 > least]
             fits = (fit_term(bench.observation, one.fitted, about, k, hopeless=hopeless) for k in since)
             self._weigh_unnamed(one.causes, fits)
-        middle, *others = SIZES
-        places = [(unknown, labels) for unknown in UNKNOWN for labels in unknown.places.values()]
-        self._weigh_unnamed((), self._with(unknown.ways(bench.facts, labels, middle) for unknown, labels in places))
-        if (found := self._unknown()) is not None:
-            unknown, terms = found
-            labels = tuple(dict.fromkeys(term.variant.label for term in terms))
-            self._weigh_unnamed((), self._with(unknown.ways(bench.facts, labels, size) for size in others))
-        if (found := self._unknown()) is not None:
-            unknown, terms = found
-            self._weigh_unnamed((), self._with(unknown.since(terms, bench.facts)))
+        for unknown in UNKNOWN:
+            self._weigh_unknown(unknown)
 
-    def _unknown(self) -> tuple[UnknownForces | UnknownMoments, tuple[Term, ...]] | None:
-        """Unknown forces or moments where they are the likeliest of what has no name, and their terms."""
-        likely = (one.found for one in self.posterior.beside_something_else() if one.probability > ALSO)
-        whole = next((one for one in likely if one is not None and one.unnamed and not one.causes), None)
-        terms = () if whole is None else whole.fitted.extension.terms
-        return next(((unknown, terms) for unknown in UNKNOWN if terms and terms[0].cause is unknown), None)
+    def _weigh_unknown(self, unknown: UnknownForces | UnknownMoments | UnknownBends) -> None:
+        """Forces or moments of a middle size at each place, where they are likeliest of other sizes and begins too."""
+        facts, (middle, *others) = self.bench.facts, SIZES
+        ways = {unknown.ways(facts, labels, middle): labels for labels in unknown.places.values()}
+        found = self._weigh_unnamed((), self._with(ways))
+        if not found:
+            return
+        labels = ways[max(found, key=_rest).terms]
+        found += self._weigh_unnamed((), self._with(unknown.ways(facts, labels, size) for size in others))
+        best = max(found, key=_rest)
+        if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
+            self._weigh_unnamed((), self._with(unknown.since(best.terms, facts)))
 
     def _with(self, every: Iterable[tuple[Term, ...]]) -> Iterator[Fit]:
         """The base model with terms from nothing, fitted."""
@@ -239,10 +233,12 @@ class Search:
             start = np.append(base.vector, np.zeros(len(terms)))
             yield fit_from(self.bench.observation, replace(base.extension, terms=terms), start, base)
 
-    def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> None:
+    def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> list[Hypothesis]:
         seen = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)
         found = (explanation_of(causes, self.bench.base, fitted) for fitted in seen)
-        self.hypotheses += [refitted(self.grid.plain, one, self.bench.facts) for one in found]
+        new = [refitted(self.grid.plain, one, self.bench.facts) for one in found]
+        self.hypotheses += new
+        return new
 
     def pairs_speak(self, best: Explanation) -> bool:
         """Whether the data make, or may make, two causes or something else likelier than they were beforehand."""
@@ -256,11 +252,16 @@ class Search:
         return believed.total(count=2) + believed.total(something_else=True) > beforehand
 
 
+def _rest(one: Hypothesis) -> float:
+    return one.rest
+
+
 def searched(bench: Workbench, known: Refits | None = None) -> Search:
     """All hypotheses about a specimen that are worth it, weighed; ``known`` causes are not refitted again."""
     search = Search(bench, known)
     nothing, *causes = search.hypotheses
-    silent = search.posterior.word == "base" and all(one.plain < nothing.plain + np.log(MATTERS) for one in causes)
+    # the linear model has each form alone; what it makes no likelier than nothing is none with all its forms either
+    silent = search.posterior.word == "base" and all(one.plain < nothing.plain + ALIKE for one in causes)
     about = beside_usual(bench.base, bench.suspicion)
     hidden = hidden_pair(about) if silent else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise

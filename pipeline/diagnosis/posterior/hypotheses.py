@@ -27,6 +27,7 @@ import numpy as np
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.posterior.explanation import Explanation
+from rod.inverse.extension import Term
 
 Word = Literal["base", "causes", "rest"]
 
@@ -49,6 +50,11 @@ class Hypothesis(NamedTuple):
     plain: float
     rest: float
     found: Explanation | None = None
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Of the refit."""
+        return self.found.fitted.extension.terms if self.found else ()
 
 
 class Believed(NamedTuple):
