@@ -261,9 +261,10 @@ def searched(bench: Workbench, known: Refits | None = None) -> Search:
     search = Search(bench, known)
     nothing, *causes = search.hypotheses
     # the linear model has each form alone; what it makes no likelier than nothing is none with all its forms either
-    silent = search.posterior.word == "base" and all(one.plain < nothing.plain + ALIKE for one in causes)
+    sound = search.posterior.word == "base"
+    silent = sound and all(one.plain < nothing.plain + ALIKE for one in causes)
     about = beside_usual(bench.base, bench.suspicion)
-    hidden = hidden_pair(about) if silent else ()
+    hidden = hidden_pair(about) if sound else ()
     # a law that is pulled far from what is known of laws hides a cause to first order, and leaves more than noise
     fits = bench.base.reduced_chi2 < FITS
     if silent and fits and not hidden:
