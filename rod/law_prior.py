@@ -1,18 +1,17 @@
 """What is known of the form of a law before its data, and the posterior averaged over what is not known of it.
 
 The unknowns of a law are the coefficients a of g = log c on a `rod.compliance_law.LawBasis`, over its abscissa t = xi
-from 0 to 1, or over the logarithm of its distance from rest. With g1, g2, g3 the derivatives of g by t, a prior of one
-form is one of
+from 0 to 1. With g1, g2, g3 the derivatives of g by t, a prior of one form is one of
 
     rough   exp(-(1 / 2 tau^2) int (g2^2 + (g1 / R)^2) dt)         R = `REACH`
     smooth  exp(-(1 / 2 tau^2) int (g3^2 + g2^2 + g1^2) dt)
     quick   rough, and in one third of the abscissa freer by a factor `FREER`
 
-with tau of `TAUS`, times exp(-(dg/dxi(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides
+with tau of `TAUS`, times exp(-(g1(rest) / S)^2 / 2) with S of `REST_SLOPES`: most cables bend alike to both sides
 of rest. They are proper but for the level, so K0 and the stiffness at rest cannot run away together. Laws that fall
 smoothly are known twice as well with the smooth ones; waves and steep stretches are followed by the rough ones; laws
-that change most just beside rest, where covers hide the cable, by those over the logarithm; laws that change at one
-place and hardly elsewhere, as where wires begin to slip, by the quick ones, which need not let the rest be as rough.
+that change at one place and hardly elsewhere, as where wires begin to slip, by the quick ones, which need not let the
+rest be as rough.
 Nothing is chosen: the posterior is the average over all of them and over all tau, each normalised and weighted by its
 evidence (Laplace), half of the weight beforehand with the quick ones, and the bands hold what the data leave open.
 
@@ -39,9 +38,6 @@ REACH = 0.25
 REST_SLOPES = (0.5, 3.0)
 """Prior standard deviations of g1 at rest: of cables that bend alike to both sides, whose law is flat there, and of
 such as were set and are steepest there."""
-
-NEAR_REST = 0.02
-"""Of the abscissa: nearer to rest its logarithm is a straight line. So much lies under the covers of most photos."""
 
 QUICK = 1.0 / 3.0
 """Of the abscissa: as much as a sudden change of the law is spread over (`rod.compliance_law`)."""
@@ -85,24 +81,14 @@ def family(form: Array, fixed: Array, share: float = 1.0) -> Family:
     return Family(form, fixed, np.log(share) + 0.5 * (np.linalg.slogdet(held)[1] - np.log(scale)))
 
 
-def integrals(spline: BSpline, rest: float | None = None, within: tuple[float, float] = (0.0, 1.0)) -> list[Array]:
-    """Integrals (p, p) of g1^2, g2^2, g3^2 over the abscissa of the splines, or over its logarithm from `rest` on."""
-    edges = np.unique(np.clip(spline.t if rest is None else np.append(spline.t, rest), *within))
-    nodes, weights = np.polynomial.legendre.leggauss(6)  # exact along xi, to 1e-3 along its logarithm
+def integrals(spline: BSpline, within: tuple[float, float] = (0.0, 1.0)) -> list[Array]:
+    """Integrals (p, p) of g1^2, g2^2, g3^2 over the abscissa of the splines, or a part of it."""
+    edges = np.unique(np.clip(spline.t, *within))
+    nodes, weights = np.polynomial.legendre.leggauss(3)  # exact for the fourth power
     half = 0.5 * np.diff(edges)[:, None]
     at, weight = (edges[:-1, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
-    # dt, d^2t, d^3t by xi
-    pace, bend, turn = np.ones_like(at), np.zeros_like(at), np.zeros_like(at)
-    if rest is not None:
-        reach = max(rest, 1.0 - rest)
-        apart = np.abs(at - rest) / reach + NEAR_REST
-        pace = 1.0 / (reach * np.log((1.0 + NEAR_REST) / NEAR_REST) * apart)
-        bend, turn = -np.sign(at - rest) * pace / (reach * apart), 2.0 * pace / (reach * apart) ** 2
-    first, second, third = (np.asarray(spline(at, order)).T for order in (1, 2, 3))
-    first = first / pace
-    second = (second - first * bend) / pace**2
-    third = (third - 3.0 * second * pace * bend - first * turn) / pace**3
-    return [(d * weight * pace) @ d.T for d in (first, second, third)]
+    derivatives = (np.asarray(spline(at, order)).T for order in (1, 2, 3))
+    return [(d * weight) @ d.T for d in derivatives]
 
 
 @lru_cache(maxsize=64)
@@ -110,17 +96,18 @@ def _families(size: int, rest: float, forms: Forms) -> tuple[Family, ...]:
     """Priors of `size` coefficients, rest at the abscissa `rest`."""
     spline = splines(size)
     rise = np.asarray(spline(rest, 1))
-    squares = [integrals(spline), integrals(spline, rest)]
-    kinds = [[_rough(square), square[2] + square[1] + square[0]][: 1 if forms == "rough" else 2] for square in squares]
+    squares = integrals(spline)
+    rough = _rough(squares)
     slopes = [np.outer(rise, rise) / slope**2 for slope in REST_SLOPES]
-    even = tuple(family(form, slope) for over in kinds for slope in slopes for form in over)
+    kinds = [rough] if forms == "rough" else [rough, sum(squares[1:], squares[0])]
+    even = tuple(family(form, slope) for slope in slopes for form in kinds)
     if forms != "all":
         return even
     begins = np.linspace(0.0, 1.0 - QUICK, PLACES)
-    freed = [_rough(integrals(spline, within=(begin, begin + QUICK))) for begin in begins]
+    freed = [_rough(integrals(spline, (begin, begin + QUICK))) for begin in begins]
     share = len(even) / (len(freed) * len(slopes))
     free = 1.0 - FREER**-2
-    return even + tuple(family(kinds[0][0] - free * own, slope, share) for own in freed for slope in slopes)
+    return even + tuple(family(rough - free * own, slope, share) for own in freed for slope in slopes)
 
 
 def _rough(squares: list[Array]) -> Array:

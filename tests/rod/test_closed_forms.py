@@ -1,4 +1,4 @@
-"""Pieces of the rod held against closed forms: circles, rotations, integrals over a logarithm, refused input."""
+"""Pieces of the rod held against closed forms: circles, rotations, beam theory, refused input."""
 
 from types import SimpleNamespace
 
@@ -13,7 +13,6 @@ from rod.equilibrium import solve
 from rod.inverse.camera import axes_off, scaled
 from rod.inverse.observation import Places, foot_points
 from rod.inverse.prediction import Prediction
-from rod.law_prior import NEAR_REST, integrals
 from rod.paper import _from_photo, _graph
 from rod.reduction import Hold
 from rod.support import CLAMP, FREE, Support
@@ -74,46 +73,6 @@ def test_a_photo_whose_axes_were_found_beside_their_place_lies_on_the_curve_turn
     foot = foot_points(places, seen)
     assert np.abs(np.cos(foot.direction) * foot.gap_y - np.sin(foot.direction) * foot.gap_x).max() < 1e-9
     assert seen.s[foot.left] + foot.t * foot.width == pytest.approx(s[20:-20] / (1.0 + grown), abs=1e-8)
-
-
-@pytest.mark.parametrize("rest", [0.0, 0.3])
-def test_the_prior_over_a_logarithm_integrates_the_powers_of_that_logarithm(rest):
-    """t = log(1 + |xi - rest| / (a N)) / log(1 + 1 / N), a the longer side; the functions are t, t^2, t^3."""
-    far = max(rest, 1.0 - rest)
-    scale = np.log1p(1.0 / NEAR_REST)
-
-    class Powers:
-        t = np.unique(np.concatenate([np.geomspace(1e-6, 1.0, 400), rest - np.geomspace(1e-6, 1.0, 400) * rest, [0.0]]))
-        t = np.unique(np.concatenate([np.clip(t, 0.0, 1.0), np.clip(rest + t * (1.0 - rest), 0.0, 1.0)]))
-
-        def __call__(self, xi, order):
-            apart = np.abs(xi - rest) + far * NEAR_REST
-            side = np.sign(xi - rest)
-            t = np.log(apart / (far * NEAR_REST)) / scale
-            one, two, three = side / (scale * apart), -1.0 / (scale * apart**2), 2.0 * side / (scale * apart**3)
-            powers = [
-                (one, two, three),
-                (2 * t * one, 2 * (one**2 + t * two), 2 * (3 * one * two + t * three)),
-                (
-                    3 * t**2 * one,
-                    6 * t * one**2 + 3 * t**2 * two,
-                    6 * one**3 + 18 * t * one * two + 3 * t**2 * three,
-                ),
-            ]
-            return np.column_stack([power[order - 1] for power in powers])
-
-    def over(power):
-        """Integral of t^power over both sides."""
-        ends = [np.log1p(side / (far * NEAR_REST)) / scale for side in (rest, 1.0 - rest)]
-        return sum(end ** (power + 1) for end in ends) / (power + 1)
-
-    exact = (
-        [[over(0), 2 * over(1), 3 * over(2)], [2 * over(1), 4 * over(2), 6 * over(3)], [0, 0, 9 * over(4)]],
-        [[0, 0, 0], [0, 4 * over(0), 12 * over(1)], [0, 0, 36 * over(2)]],
-        [[0, 0, 0], [0, 0, 0], [0, 0, 36 * over(0)]],
-    )
-    for told, upper in zip(integrals(Powers(), rest), exact, strict=True):
-        assert np.triu(told) == pytest.approx(np.triu(np.array(upper, float)), rel=1e-6, abs=1e-6)
 
 
 def test_the_abscissa_of_a_law_that_does_not_change_is_the_share_of_the_moment():

@@ -243,11 +243,11 @@ def test_an_error_that_forces_have_in_common_is_in_both_bands(found, measured, s
     for way in ("inverse", "balance"):
         before, after, there = (getattr(one, way).law for one in (found, doubted, moved))
         assert after.tangent == pytest.approx(before.tangent, rel=1e-9)
-        # truth: what both ways make of forces that are off by just that
+        # truth: what both ways make of forces that are off by just that, to a fifth: the derivatives answer to it too
         shift = np.log(np.interp(before.kappa, there.kappa, there.tangent) / before.tangent)
         added = (after.tangent_std / after.tangent) ** 2 - (before.tangent_std / before.tangent) ** 2
-        assert np.abs(np.sqrt(added) - np.abs(shift)).max() < 0.15 * np.abs(shift).max()
-        assert after.gains["common_force", -1][:, 0] == pytest.approx(shift, abs=0.15 * np.abs(shift).max())
+        assert np.abs(np.sqrt(added) - np.abs(shift)).max() < 0.2 * np.abs(shift).max()
+        assert after.gains["common_force", -1][:, 0] == pytest.approx(shift, abs=0.2 * np.abs(shift).max())
         assert np.all(after.moment_std[5:] > before.moment_std[5:])
     curve = identification_parts(doubted).inverse.curve
     assert np.linalg.norm(curve.tangent_factor_Nm2, axis=1) == pytest.approx(curve.tangent_std_Nm2, rel=1e-6)
