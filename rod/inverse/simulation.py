@@ -95,14 +95,14 @@ def _groups(model: Model, facts: Facts) -> list[tuple[list[int], Branch, bool]]:
 
     A mounted cable at displacement zero is free of force, also the straight one, whose chord cannot be imposed, and
     also under a load in the plane if displacement is counted from there; else, and with a wrong zero, its chord is
-    imposed like any other. Only pressed together it may bow to the side away from its own bend, as its photo shows.
+    imposed like any other. Unless it is pulled apart it may bow to the side away from its own bend, as its photo shows.
     """
     displacement = facts.displacement + model.shift
     mounted = [i for i, branch in enumerate(facts.branch) if branch == "mounted"]
     at_rest = model.bending.load == (0.0, 0.0) or model.bending.zero == "loaded"
     free = [i for i in mounted if displacement[i] == 0.0 and at_rest]
-    pulled = [i for i in mounted if i not in free and displacement[i] <= 0.0]
-    pressed = [i for i in mounted if i not in free and displacement[i] > 0.0]
+    pulled = [i for i in mounted if i not in free and displacement[i] < 0.0]
+    pressed = [i for i in mounted if i not in free and displacement[i] >= 0.0]
     groups: list[tuple[list[int], Branch, bool]] = [
         (free, "natural", True),
         (pulled, "natural", False),
