@@ -107,11 +107,13 @@ class Posterior:
     def credible(self) -> list[Believed]:
         """The smallest set of causes, without something else, that holds 95 % of the probability of all these.
 
-        What the data make no likelier than the base model is no name for what was found.
+        What the data make no likelier than the base model is no name for what was found. The likeliest causes come
+        first, and with them all that hold them and another one: these say nothing against them.
         """
         named = [one for one in self.believed if one.causes and not one.something_else and one.gain > ALIKE]
-        enough, whole, found = 0.0, sum(one.probability for one in named), []
-        for one in named:
+        likeliest = [one for one in named if set(named[0].causes) <= set(one.causes)]
+        enough, whole, found = 0.0, sum(one.probability for one in named), list[Believed]()
+        for one in dict.fromkeys([*likeliest, *named]):
             found.append(one)
             enough += one.probability
             if enough >= LEVEL * whole:

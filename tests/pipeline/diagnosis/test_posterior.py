@@ -258,6 +258,9 @@ def test_words():
     found = posterior(hypotheses, [0, 1])
     assert found.word == "causes" and [one.causes for one in found.credible()] == [(0,), (1,)]
     assert posterior([Hypothesis((), 0.0, 4.0), Hypothesis((0,), 1.0, -9.0)], [0]).word == "rest"
+    # a pair that holds the likeliest cause says nothing against it: together they are believed more than 95 %
+    pair = [*hypotheses[:2], Hypothesis((1,), 5.0, -9.0), Hypothesis((0, 2), 6.4, -9.0)]
+    assert [one.causes for one in posterior(pair, [0, 1, 2]).credible()] == [(0,), (0, 2)]
     # what the data cannot show is as likely where nothing was found: no name for it, whichever way rounding goes
     weak = [Hypothesis((), 0.0, -9.0), Hypothesis((0,), 3.0, -9.0), *(Hypothesis((k,), 1e-9, -9.0) for k in (1, 2, 3))]
     assert [one.causes for one in posterior(weak, [0, 1, 2, 3]).credible()] == [(0,)]
