@@ -125,17 +125,18 @@ def _cost(fitted: Fit) -> float:
     return fitted.chi2 if fitted.run.prediction is not None else np.inf
 
 
-PAYS, ATTEMPTS = 16.0, 3
-"""Chi-square (4 sigma) that a law laid along itself must bring to be laid once more, and how often at most."""
+PAYS, ATTEMPTS = 1.0, 3
+"""Chi-square that a law laid along itself must bring to be laid once more, and how often at most: models are compared
+by less than what another abscissa brings."""
 
 
 def settled(observation: Observation, fitted: Fit) -> Fit:
-    """Continue a fit that ran out of steps, or whose law is pulled by the prior of its form.
+    """Continue a fit that ran out of steps, and lay the abscissa along the law found as long as that brings something.
 
-    The abscissa lies along the law that a fit began with, and the law found may have a knee where that one had none.
+    It lies along the law that a fit began with, and the law found may have a knee where that one had none.
     """
     for _ in range(ATTEMPTS):
-        if fitted.run.prediction is None or (fitted.converged and not _law_is_pulled(fitted)):
+        if fitted.run.prediction is None:
             break
         start = laid_along(fitted) if fitted.converged else (fitted.extension, fitted.vector)
         further = fit_from(observation, *start, fitted)
@@ -145,13 +146,6 @@ def settled(observation: Observation, fitted: Fit) -> Fit:
         if gained < max(PAYS, CRAWL_FAR * fitted.chi2):
             break
     return fitted
-
-
-def _law_is_pulled(fitted: Fit) -> bool:
-    """Whether what is known of the law's form pulls at its numbers by more than a standard deviation each (rms)."""
-    base, known = fitted.extension.base, fitted.residual[-len(fitted.extension.prior) :]
-    pull = known[base.known : len(base.prior)]
-    return bool(pull @ pull > pull.size)
 
 
 def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:

@@ -18,7 +18,7 @@ from pipeline.diagnosis.statistics.score import null_maxima, threshold
 from pipeline.faults import Faults
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
-from rod.inverse.base_fit import base_fit, held_to
+from rod.inverse.base_fit import base_fit, held_to, settled
 from rod.inverse.camera import tilt_of
 from rod.inverse.fit import Fit
 from rod.inverse.observation import ZERO_STD, Observation
@@ -52,7 +52,8 @@ def beside_errors(observation: Observation, fitted: Fit) -> Fit:
     """A base model with the errors of displacements and of the rig that are usual as unknowns of that size."""
     facts = fitted.extension.facts
     lean = LEAN * tilt_of(facts.length)
-    return held_to(observation, fitted, SCATTER, (ZERO_STD, TARED * facts.force_scale, CUT, lean, lean))
+    beside = held_to(observation, fitted, SCATTER, (ZERO_STD, TARED * facts.force_scale, CUT, lean, lean))
+    return settled(observation, beside)
 
 
 @dataclass(frozen=True, eq=False)
