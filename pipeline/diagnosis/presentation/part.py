@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.load_cell import Relaxation, lost_unseen
-from pipeline.diagnosis.causes.unnamed import BEGUN
+from pipeline.diagnosis.causes.unnamed import BEGUN, UnknownForces, UnknownMoments
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.heldout import measured_gain
@@ -39,6 +39,9 @@ from rod.inverse.fit import Fit
 
 BY_CHANCE = ("left.astray", *(cause.name for cause in BEGUN))
 """What is left over that may have come by chance, and need not come again."""
+
+AT_A_PLACE = (UnknownForces.name, UnknownMoments.name)
+"""What is left over that is told with the place at which it acts."""
 
 
 def present(
@@ -99,7 +102,6 @@ def present(
     photos, forces = left_out(bench)
     before = bench.base if shown is None or accepted else shown
     spots = blind_spots(bench, seen, settings)
-    by_chance = leftover.key in BY_CHANCE
     return DiagnosisPart(
         verdict=word,
         **DiagnosisPart.told(sentence),
@@ -110,7 +112,7 @@ def present(
         gain=gain,
         blind_spots=spots,
         next_experiment=what_next(
-            bench, conclusion, settings, spots=spots, unexplained=word == "unexplained", by_chance=by_chance
+            bench, conclusion, settings, spots=spots, left=leftover.key if word == "unexplained" else None
         ),
         extended=extended,
         extended_refuted=refuted,
@@ -152,18 +154,19 @@ def what_next(
     settings: DiagnosisSettings,
     *,
     spots: list[BlindSpot],
-    unexplained: bool,
-    by_chance: bool,
+    left: str | None,
 ) -> NextExperiment | None:
     """What separates the names that are confused; without any, what tells most about what these data cannot show.
 
     In this order: a class can be settled, a misfit without a name needs a second look at the same cable, a test without
-    unloading hides whole causes, and the force calibration is never seen. What came ``by_chance`` need not come again.
+    unloading hides whole causes, and the force calibration is never seen. ``left`` is the key of what is unexplained:
+    what came by chance need not come again, and what acts at a place is looked for there.
     """
-    if conclusion.accepted is not None and conclusion.rivals and not unexplained:
+    if conclusion.accepted is not None and conclusion.rivals and left is None:
         return next_experiment(bench, conclusion.accepted, conclusion.rivals, settings)
-    if unexplained:
-        look = "next.repeat" if by_chance else "next.turn" if bench.facts.returns else "next.turn-unload"
+    if left is not None:
+        turn = "next.turn" if bench.facts.returns else "next.turn-unload"
+        look = "next.repeat" if left in BY_CHANCE else "next.look" if left in AT_A_PLACE else turn
         return NextExperiment(**NextExperiment.told(Message(look)), separates=[])
     if not bench.facts.returns:
         hidden = ["bearing_friction", "hysteresis", "plastic_set"]

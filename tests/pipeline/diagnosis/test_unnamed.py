@@ -81,6 +81,7 @@ def test_a_bearing_that_meets_a_stop(protocol, pad, seed):
     test = hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=seed)
     part, _, _ = among(test, "")
     assert part.verdict == "unexplained" and part.leftover.key == "unnamed.moments", part.headline
+    assert part.next_experiment.key == "next.look"
     said, bent = part.leftover.values, bend(cable, [step.displacement for step in test.steps])
     turned = np.array([step.theta[0] - bent[0].theta[0] for step in bent])
     assert said["place"]["key"] == "unnamed.left" and said["step"] == test.steps[int(np.argmax(turned))].step
@@ -102,6 +103,7 @@ def test_a_cable_that_meets_something(protocol, seed, place, force):
     test = changed(cable, met, protocol, 4, seed=seed)
     part, _, _ = among(test, "")
     assert part.verdict == "unexplained" and part.leftover.key == "unnamed.forces", part.headline
+    assert part.next_experiment.key == "next.look"
     said = part.leftover.values
     assert said["since"]["values"]["step"] == test.steps[4].step
     at, std, _ = said["place"]["values"]["at"]
