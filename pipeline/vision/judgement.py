@@ -111,7 +111,7 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     if path is None:
         return refused(photo, "photo/bearing.nothing")
     cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
-    if not len(cut.seen_widths):
+    if not len(cut.seen_widths) or cut.usual_width < reading.finest:
         return refused(photo, "photo/contrast.no-edges")
     refusal = _check_width(photo, cut, standout.reduction, cable)
     if refusal is not None:

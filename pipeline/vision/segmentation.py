@@ -164,7 +164,8 @@ def _read(photo: Photo, standout: Standout, wanted: Wanted, cable: Cable) -> Rou
         outcome = _chosen(photo, judged)
         if isinstance(outcome, RoughCable) and outcome.evidence.clear and not outcome.goes_on:
             return outcome  # surely the whole cable: no other reading is needed
-    return _chosen(photo, judged)
+    outcome = _chosen(photo, judged)
+    return (_blank(photo) or outcome) if isinstance(outcome, Rejected) else outcome
 
 
 class _Judged(NamedTuple):

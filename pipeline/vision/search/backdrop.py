@@ -133,6 +133,14 @@ def stand_out(photo: Photo, reduction: int, *, window: tuple[int, int, int, int]
     return replace(small, residual=residual, covariance=_covariance(residual))
 
 
+def averaged(standout: Standout, size: int) -> Standout:
+    """What stands out as the mean over a disc of ``size`` cells, against the ground's scatter of such means."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)).astype(np.float32)
+    means = np.asarray(cv2.filter2D(standout.residual, -1, disc / disc.sum()), np.float32)
+    residual = means.reshape(standout.residual.shape)
+    return replace(standout, residual=residual, covariance=_covariance(residual))
+
+
 def _above_ground(small: Image) -> Image:
     """The picture without a robust second-order surface of each channel."""
     height, width, channels = small.shape
