@@ -104,7 +104,10 @@ INSIDE = {
         ("closeup",),
         ("candidates",),
         ("ends",),
-        ("beyond",),
+        (
+            "beyond",
+            "border",
+        ),
     ],
     "pipeline.vision.bearings": [("rim",), ("rings", "cut"), ("covers",), ("cover_size", "steady")],
     "pipeline.vision.centerline": [

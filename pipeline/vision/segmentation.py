@@ -27,6 +27,7 @@ from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, in_one_colour, stand_out
 from pipeline.vision.search.beyond import LEAST_MORE_WIDTHS
+from pipeline.vision.search.border import border_width
 from pipeline.vision.search.candidates import Reading, Wanted, read_photo
 
 Window = tuple[int, int, int, int]
@@ -130,15 +131,29 @@ def _widths(photo: Photo, slenderness: float) -> list[float]:
 
 
 def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | Rejected:
+    """The cable in a window; where no width is known, one from border to border of what lies there."""
+    seen, found = _found(photo, cable, window)
+    if isinstance(found, Rejected) or cable.diameter_px is not None:
+        return found
+    whole = border_width(seen, found)
+    if whole is None:
+        return found
+    seen, again = _found(photo, replace(cable, diameter_px=whole), window)
+    if isinstance(again, RoughCable) and _lies_on(again, [found.path_px]) and border_width(seen, again) is None:
+        return again
+    return refused(photo, "photo/width.part", width_px=2.0 * found.half_width_px, whole_px=whole)
+
+
+def _found(photo: Photo, cable: Cable, window: Window | None) -> tuple[Photo, RoughCable | Rejected]:
+    """The cable in a window, in all colours or in one, and the photo in these."""
     reduction = choose_reduction(photo.size, cable.diameter_px)
     standout = stand_out(photo, reduction, window=window)
     wanted = _wanted(standout, cable)
-
     found, alike = _read(photo, standout, wanted, cable), in_one_colour(photo, standout)
     if alike is None:
-        return found
+        return photo, found
     in_one = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
-    return in_one if _is_better(in_one, found) else found
+    return (alike, in_one) if _is_better(in_one, found) else (photo, found)
 
 
 def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected) -> bool:

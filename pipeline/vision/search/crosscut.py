@@ -265,7 +265,7 @@ def find_flanks(
     rise, fall = rise[every], fall[every]
     best = spacing * _pair_width(rise, fall, near, width / spacing, known)
     score = _pair_score(rise, fall, near, np.array([best / spacing]))[:, 0]
-    course = offsets[near][_best_course(score, _PAIR_WANDER_COST)]
+    course = offsets[near][best_course(score, _PAIR_WANDER_COST)]
     middle = np.interp(np.arange(len(relief)), every, course)
     least = _LEAST_EDGE_SHARE * usual
     slope = _pooled(slope, pooling)
@@ -300,7 +300,7 @@ def _at(values: Array, columns: Array) -> Array:
     return np.asarray((1 - share) * padded[:, at] + share * padded[:, at + 1])
 
 
-def _best_course(score: Array, cost: float) -> NDArray[np.intp]:
+def best_course(score: Array, cost: float) -> NDArray[np.intp]:
     """Column on each row so that the sum of scores, less ``cost`` for each column moved, is largest."""
     reached = _reached(score, cost)
     at = int(np.argmax(reached[-1]))
