@@ -153,17 +153,25 @@ def _found(photo: Photo, cable: Cable, window: Window | None) -> tuple[Photo, Ro
     if alike is None:
         return photo, found
     in_one = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
-    return (alike, in_one) if _is_better(in_one, found) else (photo, found)
+    return (alike, in_one) if _is_better(in_one, found, cable.diameter_px) else (photo, found)
 
 
-def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected) -> bool:
-    """Whether the cable is seen better in one colour: what is narrower or shorter may be a stripe or a half of it."""
+def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected, diameter: float | None) -> bool:
+    """Whether the cable is seen better in one colour: what is narrower or shorter may be a stripe or a half of it.
+
+    Of a known ``diameter`` (px), the strip that is as wide: with the colour of a shadow beside it, it is wider.
+    """
     if isinstance(in_one, Rejected) or _is_piece(in_one):
         return False  # a piece of the cable may be anything of that colour too
     if isinstance(found, Rejected):
         return True
-    larger = max(in_one.length_px / found.length_px, in_one.half_width_px / found.half_width_px)
-    return larger > _WIDER or in_one.evidence.firmness > found.evidence.firmness
+    longer, wider = in_one.length_px / found.length_px, in_one.half_width_px / found.half_width_px
+    if diameter is not None:
+        off, off_in_one = (abs(np.log(2.0 * one.half_width_px / diameter)) for one in (found, in_one))
+        wider = float(np.exp(off - off_in_one))
+    if max(longer, wider) > _WIDER:
+        return True
+    return in_one.evidence.firmness > found.evidence.firmness and (diameter is None or wider * _WIDER > 1.0)
 
 
 def _read(photo: Photo, standout: Standout, wanted: Wanted, cable: Cable) -> RoughCable | Rejected:

@@ -185,7 +185,7 @@ def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) ->
             held=min(1.0, float(np.linalg.norm(full[:, 0] - used[:, 0]) / (np.linalg.norm(shift) + 1e-12))),
         )
 
-    held = _variable_projection(pooled, full, ramps=True, cost=cost) if thin else None
+    held = _variable_projection(pooled, full, ramps=True, cost=cost, about=_lasting(full_linear)) if thin else None
     return profiles(full, full_linear), None if held is None else profiles(*held)
 
 
@@ -217,6 +217,19 @@ def _running_median(values: Array) -> Array:
     return np.asarray(median_filter(sides, size=size, mode="nearest")).reshape(values.shape)
 
 
+def _lasting(linear: Array) -> Array:
+    """Ramps of windows ``(k, 4)``, their levels and steps aside, as far as all windows of a side have them.
+
+    Halo, grid and texture make ramps that differ from window to window, shade and the rim of a shadow last along a
+    side: its mean, less the part by which its own scatter would make one (James and Stein).
+    """
+    sides = linear.reshape(2, -1, 4)
+    mean = medians(sides, axis=1)
+    chance = MAD_TO_STD * medians(np.abs(sides - mean[:, None]), axis=1) / np.sqrt(sides.shape[1])
+    lasting = mean * np.maximum(1.0 - (chance / np.where(mean == 0.0, np.inf, mean)) ** 2, 0.0)
+    return np.repeat(lasting, sides.shape[1], axis=0)
+
+
 def _pool(
     offset: Float32, value: Float32, cell: NDArray[np.int64], keep: NDArray[np.bool_], shape: tuple[int, int]
 ) -> _Pooled:
@@ -230,13 +243,13 @@ def _pool(
 
 
 def _variable_projection(
-    pooled: _Pooled, start: Array, *, ramps: bool, cost: Array | float = 0.0
+    pooled: _Pooled, start: Array, *, ramps: bool, cost: Array | float = 0.0, about: Array | float = 0.0
 ) -> tuple[Array, Array]:
     """Place and blur ``(k, 2)``, and level, step and ramps ``(k, 4)``, of pooled profiles, all windows at once.
 
     Gauss-Newton on place and blur alone: the other four are solved for exactly at each step (Golub and Pereyra, in
     Kaufman's form). Steps are bounded to a part of the blur. ``cost`` is the mean square misfit of the pixels that a
-    ramp of 1 in a blur counts for.
+    ramp of 1 in a blur beyond ``about`` (k, 4), of which only ramps count, counts for.
     """
     place, blur = start[:, 0].copy(), start[:, 1].copy()
     offset, root = pooled.offset, np.sqrt(pooled.count)[:, None, :]
@@ -248,6 +261,7 @@ def _variable_projection(
     # A weak prior on the ramps, a thousandth of the data's weight: it decides only where blur and ramp look the same.
     prior = np.zeros((len(place), 4))
     prior[:, 2:] = (total * (1e-3 / 12.0 * (span / 2.0) ** 2 + cost * start[:, 1] ** 2))[:, None]
+    expected = prior * about
     prior += 1e-9 * total[:, None]
     size = 4 if ramps else 2
     for _ in range(25):
@@ -255,7 +269,7 @@ def _variable_projection(
         basis = np.stack([np.ones_like(offset), cumulative, inside, outside][:size], axis=1) * root
         turned = basis.transpose(0, 2, 1)
         inverse = np.linalg.inv(basis @ turned + prior[:, :size, None] * np.eye(size))
-        linear[:, :size] = (inverse @ (basis @ value.transpose(0, 2, 1)))[..., 0]
+        linear[:, :size] = (inverse @ (basis @ value.transpose(0, 2, 1) + expected[:, :size, None]))[..., 0]
         residual = value - linear[:, None, :size] @ basis
         step, ramp_in, ramp_out = linear[:, 1:2], linear[:, 2:3], linear[:, 3:]
         by_place = -step * density - ramp_in - (ramp_out - ramp_in) * cumulative
