@@ -19,6 +19,7 @@ from pipeline.vision.evidence import Evidence, unlike_a_cable, weigh
 from pipeline.vision.median import median, scatter
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import ChordFrame
+from pipeline.vision.search.border import soft_beside_sharp
 
 _WIDTH_OFF = 0.15
 """Relative; a strip split off along a highlight is 30 % too narrow, scales are known to some percent. More by the blur,
@@ -36,10 +37,14 @@ missed by 0.06 at most.
 
 def evidence_of(rough: RoughCable, sections: Sections) -> Evidence:
     """How much what was measured looks like a cable."""
+    line, std = _middle_across(sections), 2.0 * median(sections.std)
+    return weigh(rough.closeup, *line, sections.width, std=std, share=sections.share, grid=rough.grid_px)
+
+
+def _middle_across(sections: Sections) -> tuple[Array, Array]:
+    """Points ``(k, 2)`` px along the midline, and unit vectors across it."""
     across = sections.second - sections.first
-    across = across / (np.hypot(*across.T)[:, None] + 1e-12)
-    middle, std = 0.5 * (sections.first + sections.second), 2.0 * median(sections.std)
-    return weigh(rough.closeup, middle, across, sections.width, std=std, share=sections.share, grid=rough.grid_px)
+    return 0.5 * (sections.first + sections.second), across / (np.hypot(*across.T)[:, None] + 1e-12)
 
 
 def refusal(
@@ -59,11 +64,17 @@ def refusal(
     told = (
         (None if evidence.enough else unlike_a_cable(evidence))
         or (None if evidence.bordered else _uneven(fit, sections, middle))
+        or _soft(rough, sections)
         or _another_width(whole, diameter, scale * sections.softest)
         or _beside_cover(rough, fit, chord, middle)
         or _bent(fit, middle)
     )
     return None if told is None else Rejected(rough.image, Message(told.key, **{**figure, **told.values}))
+
+
+def _soft(rough: RoughCable, sections: Sections) -> Message | None:
+    soft = soft_beside_sharp(rough.closeup, *_middle_across(sections), median(sections.width))
+    return Message("photo/outline.soft") if soft else None
 
 
 def _another_width(middle: float, diameter: float | None, blur: float) -> Message | None:

@@ -285,3 +285,16 @@ def test_shades_of_a_white_cable_on_white_are_no_edges(ground, tmp_path):
     # 20 and 25 px beside the cable before, with 3.6 and 2 px stated
     assert isinstance(found, Rejected)
     assert found.code in ("photo/outline", "photo/contrast")
+
+
+@pytest.mark.parametrize("seed", [202, 204, 214, 218])
+def test_a_shadow_beside_a_white_cable_on_white_is_no_half_of_it(seed, tmp_path):
+    """From the shadow's soft rim to a soft shade on the sheath: a strip as wide as the cable, 24 to 31 px beside it."""
+    found = white_on_white(WHITE_GROUNDS[0], seed, tmp_path)
+    assert isinstance(found, Rejected)
+    assert found.code == "photo/outline"
+
+
+@pytest.mark.parametrize("seed", [201, 221])
+def test_a_white_cable_on_white_is_traced_where_its_border_is_seen(seed, tmp_path):
+    assert not isinstance(white_on_white(WHITE_GROUNDS[0], seed, tmp_path), Rejected)
