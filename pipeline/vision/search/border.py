@@ -29,7 +29,8 @@ _ABOVE_GROUND = 2.0  # times the steepest course on the ground farther out: spec
 _FARTHEST = 1.2  # widths from the middle to which a sharper edge than the strip's is sought
 _SCALES = 0.05, 0.15  # widths; of a step, slopes on them differ threefold, of a rim as broad as the second hardly
 _SHARPER = 2.0  # of that ratio: rims of shadows beside borders 2.5 and more, borders beside stripes and print below 1.9
-_MOVED = 2.0  # of a usual slope, for each px that a course moves from group to group
+_LEAST_SPACING = 0.05  # widths; a strip 2 px wide has edges to be told apart too
+_MOVED = 2.0  # of a usual slope, for each column that a course moves from group to group
 
 
 def border_width(photo: Photo, found: RoughCable) -> float | None:
@@ -37,10 +38,10 @@ def border_width(photo: Photo, found: RoughCable) -> float | None:
     first, last = found.visible
     middle = found.path_px[first : last + 1]
     width = 2.0 * found.half_width_px
-    offsets = np.arange(-_GROUND[1] * width, _GROUND[1] * width + 1.0)
+    offsets, spacing = _offsets(_GROUND[1], width)
     across = path_normals(middle)[1]
     grey = values_at(photo, middle[:, None] + offsets[:, None] * across[:, None]) @ np.array(found.weights, np.float32)
-    slope, places = _slopes(grey, 1.0), (_OWN, _BESIDE, _GROUND)
+    slope, places = _slopes(grey, 1.0 / spacing), (_OWN, _BESIDE, _GROUND)
     sides = [[_steepest(slope, side * offsets / width, place)[:2] for place in places] for side in (-1.0, 1.0)]
     own = min(edges[0][0] for edges in sides)
     ground = min(edges[2][0] for edges in sides)
@@ -59,13 +60,19 @@ def soft_beside_sharp(closeup: Closeup, middle: Array, across: Array, width: flo
         Along the midline as measured, and unit vectors across it.
     width : px
     """
-    offsets = np.arange(-_FARTHEST * width, _FARTHEST * width + 1.0)
+    offsets, spacing = _offsets(_FARTHEST, width)
     grey = straightened(closeup.grey, middle - closeup.origin_px, across, offsets)[..., 0]
-    fine, broad = (_slopes(grey, scale * width) for scale in _SCALES)
+    fine, broad = (_slopes(grey, scale * width / spacing) for scale in _SCALES)
     places = [(-0.6, -0.4), (0.4, 0.6), (-_FARTHEST, -0.65), (-0.35, 0.35), (0.65, _FARTHEST)]
     first, second, *others = (_sharpness(fine, broad, offsets / width, place) for place in places)
     own = min(first, second, key=lambda edge: edge[1])
     return any(slope > own[0] and sharp > _SHARPER * own[1] for slope, sharp in others)
+
+
+def _offsets(reach: float, width: float) -> tuple[Array, float]:
+    """Offsets (m,) px up to ``reach`` widths on both sides, and their spacing: of pixels, on thin strips closer."""
+    spacing = min(1.0, _LEAST_SPACING * width)
+    return np.arange(-reach * width, reach * width + spacing, spacing), spacing
 
 
 def _sharpness(fine: Array, broad: Array, offsets: Array, place: tuple[float, float]) -> tuple[float, float]:

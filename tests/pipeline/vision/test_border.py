@@ -6,9 +6,10 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import Rejected
 from pipeline.vision.centerline.measurement import follow_cable
+from pipeline.vision.photo import Closeup
 from pipeline.vision.render import Ground, Light, Sensor
 from pipeline.vision.scale.plane import PlaneMap
-from pipeline.vision.search.border import border_width
+from pipeline.vision.search.border import border_width, soft_beside_sharp
 from pipeline.vision.segmentation import find_cable
 from tests.pipeline.vision.drawn import drawn
 from tests.pipeline.vision.test_segmentation import DIAMETER, SCALE, UNKNOWN, photo_of, scene, strand
@@ -44,3 +45,12 @@ def test_a_soft_shadow_is_no_border() -> None:
     found = find_cable(photo, cable=UNKNOWN)
     assert not isinstance(found, Rejected)
     assert border_width(photo, found) is None
+
+
+@pytest.mark.parametrize("width", [1.0, 2.5, 5.0, 20.0])
+@pytest.mark.parametrize("sections", [3, 12, 200])
+def test_strips_of_any_size_are_judged(width: float, sections: int) -> None:
+    picture = np.random.default_rng(1).random((80, 260)).astype(np.float32)
+    middle = np.column_stack([30.0 + np.arange(sections), np.full(sections, 40.0)])
+    across = np.tile([0.0, 1.0], (sections, 1))
+    assert soft_beside_sharp(Closeup(picture, (0, 0)), middle, across, width) in (True, False)
