@@ -44,7 +44,8 @@ class Evidence:
     length : px
         Measured.
     seen : share
-        Of the blocks, those with both edges three standard deviations above the ground's own steps.
+        Of the blocks, those with both edges three standard deviations above the ground's own steps; of a strip as
+        wide as the cable is known to be, or half of the usual one.
     edges : ratio
         Median over the blocks of the weaker edge's step in standard deviations of the ground's.
     unsteady : ratio
@@ -107,6 +108,7 @@ def weigh(
     share: float = 1.0,
     crossed: tuple[float, float] | None = None,
     grid: float = 1.0,
+    known: bool = False,
 ) -> Evidence:
     """The evidence for a strip.
 
@@ -128,6 +130,9 @@ def weigh(
         Where something leaves the strip.
     grid : px
         Distance of values of the picture that tell something new.
+    known : bool
+        That the cable is so wide: no flank of it passes then, and above half of the usual step an edge is likelier
+        there than not, however faint it is.
     """
     width, gap = median(widths), median(step_lengths(middle))
     each = max(1, round(width / max(gap, 1e-9)))
@@ -144,10 +149,11 @@ def weigh(
     ground = _steps(blocks, offset, np.concatenate([np.array(_NULL), -np.array(_NULL)]) * width, reach)
     noise = float(np.hypot(scatter(ground - np.median(ground, axis=0), 0.0), _LEVEL))
     weaker = np.min(_steps(blocks, offset, np.array([-0.5, 0.5]) * width, reach), axis=1) / noise
+    edges = median(weaker)
     return Evidence(
         length=length,
-        seen=float(np.mean(weaker > _SURE)) * share,
-        edges=median(weaker),
+        seen=float(np.mean(weaker > (min(_SURE, 0.5 * edges) if known else _SURE))) * share,
+        edges=edges,
         unsteady=_unsteady(widths, width, std, grid),
         crossed=crossed,
     )

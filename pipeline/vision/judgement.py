@@ -135,7 +135,8 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     # a cell's edge is found to a fifth of it
     std, grid = 0.3 * standout.reduction, photo.grid_px
     across = path_normals(path)[1]
-    evidence = weigh(found.closeup, path, across, widths, std=std, share=share, crossed=crossed, grid=grid)
+    known = cable.diameter_px is not None
+    evidence = weigh(found.closeup, path, across, widths, std=std, share=share, crossed=crossed, grid=grid, known=known)
     return replace(found, goes_on=more is not None, evidence=evidence, findings=told)
 
 

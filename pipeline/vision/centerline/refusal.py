@@ -35,10 +35,10 @@ missed by 0.06 at most.
 """
 
 
-def evidence_of(rough: RoughCable, sections: Sections) -> Evidence:
+def evidence_of(rough: RoughCable, sections: Sections, *, known: bool = False) -> Evidence:
     """How much what was measured looks like a cable."""
     line, std = _middle_across(sections), 2.0 * median(sections.std)
-    return weigh(rough.closeup, *line, sections.width, std=std, share=sections.share, grid=rough.grid_px)
+    return weigh(rough.closeup, *line, sections.width, std=std, share=sections.share, grid=rough.grid_px, known=known)
 
 
 def _middle_across(sections: Sections) -> tuple[Array, Array]:
@@ -56,7 +56,7 @@ def refusal(
     diameter: float | None,
 ) -> Rejected | None:
     """Why a fitted curve is not the cable's; ``width`` (n,) m of the cable on the sections, ``diameter`` m if known."""
-    evidence = evidence_of(rough, sections)
+    evidence = evidence_of(rough, sections, known=diameter is not None)
     middle = middle_width(width)[0]
     scale = middle / median(sections.width)
     whole = scale * sections.caliper

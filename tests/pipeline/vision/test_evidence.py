@@ -22,6 +22,23 @@ def test_a_refusal_tells_only_what_was_weighed(widths_long, told):
     assert all(np.isfinite(value) for value in refused.values.values())
 
 
+@pytest.mark.parametrize("step", [0.0, 0.1, 0.27, 0.3, 0.4])
+def test_faint_edges_all_along_are_seen_all_along(step):
+    """A strip in noise: its edges are one thing where they are about alike, however many blocks fall below the limit.
+
+    With three standard deviations for every block half of a cable of 3.4 was told to show no edge.
+    """
+    rng, count = np.random.default_rng(5), 401
+    picture = 0.5 + 0.2 * rng.standard_normal((120, 2080))
+    picture[50:70] -= step
+    middle = np.column_stack([40.0 + 5.0 * np.arange(count), np.full(count, 59.5)])
+    across = np.tile([0.0, 1.0], (count, 1))
+    widths = 20.0 + 0.1 * rng.standard_normal(count)
+    found = weigh(Closeup(picture.astype(np.float32), (0, 0)), middle, across, widths, std=0.1, known=True)
+    assert found.enough == (found.edges > 3.0)
+    assert not found.enough or found.seen > 0.9
+
+
 ARMS = {
     "nothing": (),
     "a bolt as large as they are": (((320, 100 - 18), 11.0),),
