@@ -24,9 +24,14 @@ from rod.inverse.extension import Extension, Term
 from rod.inverse.fit import FITS, fit_from
 
 
-def pairs_beside(bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int]) -> list[Explanation]:
-    """A single cause with each of some others, those in the model already left out; hopeless fits end early."""
-    found, rival = [], np.inf
+def pairs_beside(
+    bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int], *, rival: float
+) -> list[Explanation]:
+    """A single cause with each of some others, those in the model already left out.
+
+    ``rival`` is the chi-square that other causes have reached: fits that stay far above it end early.
+    """
+    found = []
     for cause in causes:
         if cause == best.causes[0] or not second.of(cause).size:
             continue

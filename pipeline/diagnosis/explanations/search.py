@@ -139,7 +139,7 @@ class Search:
             second = self.beside(best)
             every = candidates(second, margin=1.0, most=len(second.causes))
             others = [cause for cause in every if not any({*best.causes, cause} == {*pair.causes} for pair in found)]
-            found += self.add(pairs_beside(bench, best, second, others))
+            found += self.add(self._pairs_beside(best, others))
         elif believed.total(count=2) < sum(SHARES[2]):
             return
         forms = with_all_forms(bench, found)
@@ -150,11 +150,18 @@ class Search:
 
     def _with_others(self, one: Explanation) -> list[Explanation]:
         """A single cause with each of the two that score most beside it, and of those that are likely by the scores."""
-        second = self.beside(one)
-        further = {cause: plain for cause, (plain, _) in self.weighed_beside(one).further.items()}
-        whole = np.logaddexp.reduce([*further.values()])
-        likely = [cause for cause, plain in further.items() if plain > whole + np.log(ALSO)]
-        return pairs_beside(self.bench, one, second, [*dict.fromkeys([*candidates(second)[:2], *likely])])
+        second, own = self.beside(one), self.weighed_beside(one)
+        mine = next((known.plain for known in self.hypotheses if known.found is one), own.own.plain) - own.own.plain
+        further = {cause: plain + mine for cause, (plain, _) in own.further.items()}
+        rivals = [known.plain for known in self.hypotheses if known.found is not None]
+        enough = np.logaddexp.reduce([*further.values(), *rivals]) + np.log(ALSO)
+        likely = [cause for cause, plain in further.items() if plain > enough]
+        return self._pairs_beside(one, [*dict.fromkeys([*candidates(second)[:2], *likely])])
+
+    def _pairs_beside(self, one: Explanation, causes: Sequence[int]) -> list[Explanation]:
+        named = (known.found for known in self.hypotheses if known.found is not None and not known.found.unnamed)
+        rival = min((found.fitted.chi2 for found in named), default=np.inf)
+        return pairs_beside(self.bench, one, self.beside(one), causes, rival=rival)
 
     def _members_alone(self, begun: set[Forms]) -> Iterator[Explanation]:
         """Causes of the likeliest pair, each fitted alone in the form that it has there, if that is new."""
