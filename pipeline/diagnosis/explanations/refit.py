@@ -109,8 +109,9 @@ def fit_term(
         term = Term(term.cause, replace(term.variant, tuned=()))
     added = Addition(base, term, float(suspicion.scores.estimate[direction]), suspicion.columns[:, direction])
     best: Fit | None = None
+    far = FAR * (len(base.residual) - added.extension.size)
     for start, spare in ((linear_start(observation, added), False), *_elsewhere(added)):
-        if spare and best is not None and best.reduced_chi2 < FAR:
+        if spare and min(hopeless, np.inf if best is None else best.chi2) < far:
             continue
         found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
@@ -150,7 +151,7 @@ def _cost_at(observation: Observation, extension: Extension, vector: Array, near
 
 
 def _elsewhere(added: Addition) -> list[tuple[Array, bool]]:
-    """Further starts, and whether they are spare ones for where no other leads near the data.
+    """Further starts, and whether they are spare ones for where no other, of any cause, leads near the data.
 
     With the law and K0 that photos show, with K0 of the other sign where it may be wrong, and with a constant law.
     """

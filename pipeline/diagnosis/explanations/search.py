@@ -64,11 +64,13 @@ class Search:
         return posterior(self.hypotheses, self.causes)
 
     def add(self, found: Sequence[Explanation]) -> list[Explanation]:
-        """Weigh refits and return them; the likeliest are fitted to the end and weighed with something else too."""
+        """Weigh refits and return them; the likeliest are weighed with something else too, rivals fitted to the end."""
         rest = self.hypotheses[0].rest
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
-        best = [self._settled(one) for _, one in new[:LIKELIEST]]
+        rivals = [*(plain for plain, _ in new[:1]), *(known.plain for known in self.hypotheses)]
+        enough = max(rivals) + np.log(ALSO)
+        best = [self._settled(one) if plain > enough else one for plain, one in new[:LIKELIEST]]
         self.hypotheses += [refitted(self.grid, one, self.bench.facts) for one in best]
         self.hypotheses += [Hypothesis(one.causes, plain, rest, one) for plain, one in new[LIKELIEST:]]
         return [*best, *(one for _, one in new[LIKELIEST:])]
@@ -218,27 +220,27 @@ class Search:
             fits = (fit_term(bench.observation, one.fitted, about, k, hopeless=hopeless) for k in since)
             self._weigh_unnamed(one.causes, fits)
         for unknown in UNKNOWN:
-            self._weigh_unknown(unknown)
+            self._weigh_unknown(unknown, hopeless)
 
-    def _weigh_unknown(self, unknown: UnknownForces | UnknownMoments | UnknownBends) -> None:
+    def _weigh_unknown(self, unknown: UnknownForces | UnknownMoments | UnknownBends, hopeless: float) -> None:
         """Forces or moments of a middle size at each place, where they are likeliest of other sizes and begins too."""
         facts, (middle, *others) = self.bench.facts, SIZES
         ways = {unknown.ways(facts, labels, middle): labels for labels in unknown.places.values()}
-        found = self._weigh_unnamed((), self._with(ways))
+        found = self._weigh_unnamed((), self._with(ways, hopeless))
         if not found:
             return
         labels = ways[max(found, key=_rest).terms]
-        found += self._weigh_unnamed((), self._with(unknown.ways(facts, labels, size) for size in others))
+        found += self._weigh_unnamed((), self._with((unknown.ways(facts, labels, size) for size in others), hopeless))
         best = max(found, key=_rest)
         if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
-            self._weigh_unnamed((), self._with(unknown.since(best.terms, facts)))
+            self._weigh_unnamed((), self._with(unknown.since(best.terms, facts), hopeless))
 
-    def _with(self, every: Iterable[tuple[Term, ...]]) -> Iterator[Fit]:
+    def _with(self, every: Iterable[tuple[Term, ...]], hopeless: float) -> Iterator[Fit]:
         """The base model with terms from nothing, fitted."""
         base = self.bench.base
         for terms in every:
             start = np.append(base.vector, np.zeros(len(terms)))
-            yield fit_from(self.bench.observation, replace(base.extension, terms=terms), start, base)
+            yield fit_from(self.bench.observation, replace(base.extension, terms=terms), start, base, hopeless=hopeless)
 
     def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> list[Hypothesis]:
         seen = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)
