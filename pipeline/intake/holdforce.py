@@ -195,8 +195,8 @@ def _inflation(fits: Sequence[_Fit]) -> float:
 def _sigmas(fits: Sequence[_Fit], floor: float) -> list[float]:
     """Standard deviation of a sample in each hold: common to all unless Bartlett's test at 1 % says they differ.
 
-    Where they differ each hold keeps its own, drawn toward the common one with the weight of four samples: a variance
-    from few samples is itself uncertain.
+    Where they differ each hold keeps its own, drawn with the weight of four samples toward the mean of their logarithms:
+    a variance from few samples is itself uncertain, and a single loud hold makes no quiet one uncertain.
     """
     freedom = np.array([fit.freedom for fit in fits], dtype=np.float64)
     rss = np.array([float(fit.residuals @ fit.residuals) for fit in fits])
@@ -210,6 +210,8 @@ def _sigmas(fits: Sequence[_Fit], floor: float) -> list[float]:
         correction = 1.0 + (np.sum(1.0 / nu) - 1.0 / nu.sum()) / (3.0 * (groups - 1))
         statistic = (nu.sum() * math.log(pooled) - float(np.sum(nu * np.log(variances)))) / correction
         if chdtrc(groups - 1, max(statistic, 0.0)) < 0.01:
-            weight = 4.0
-            return [math.sqrt(v) for v in (rss + weight * pooled) / (freedom + weight)]
+            # the logarithm of a variance from nu degrees of freedom falls short by 1 / nu in the mean
+            usual, weight = math.exp(float(np.sum(nu * np.log(variances) + 1.0)) / nu.sum()), 4.0
+            toward = np.where(used, usual, pooled)  # a hold of a single sample may be a loud one
+            return [math.sqrt(v) for v in (rss + weight * toward) / (freedom + weight)]
     return [math.sqrt(pooled)] * len(fits)

@@ -73,8 +73,17 @@ def test_holds_with_different_noise_keep_their_own():
     quiet, _ = campaign(1, trend=TRENDS["none"], sigma=0.002, samples=40, holds=3)
     loud, _ = campaign(2, trend=TRENDS["none"], sigma=0.05, samples=40, holds=3)
     found = hold_forces([*quiet, *loud], resolution=1e-6, settings=SETTINGS)
-    # 0.22: in a variance of 43 samples four are the common one; a sigma of 39 samples is known to 11 %, three of those
+    # in a variance of 43 samples four are the common one; a sigma of 39 samples is known to 11 %, three of those
     assert max(found.std[:3]) < 0.3 * min(found.std[3:])
+
+
+def test_one_loud_hold_makes_no_quiet_one_uncertain():
+    quiet, _ = campaign(1, trend=TRENDS["none"], sigma=0.002, samples=6, holds=9)
+    loud, _ = campaign(2, trend=TRENDS["none"], sigma=0.5, samples=6, holds=1)
+    found = hold_forces([*quiet, *loud], resolution=1e-6, settings=SETTINGS)
+    # a tenth of the logarithm of 250 is a factor of 1.7, and half of each variance is the common one
+    assert np.median(found.std[:9]) < 2.0 * 0.002 / np.sqrt(6.0)
+    assert found.std[9] > 0.3 * 0.5 / np.sqrt(6.0)
 
 
 def test_never_zero():
