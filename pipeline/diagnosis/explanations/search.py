@@ -64,13 +64,11 @@ class Search:
         return posterior(self.hypotheses, self.causes)
 
     def add(self, found: Sequence[Explanation]) -> list[Explanation]:
-        """Weigh refits and return them; the likeliest are weighed with something else too, rivals fitted to the end."""
+        """Weigh refits and return them; the likeliest are fitted to the end and weighed with something else too."""
         rest = self.hypotheses[0].rest
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
-        rivals = [*(plain for plain, _ in new[:1]), *(known.plain for known in self.hypotheses)]
-        enough = max(rivals) + np.log(ALSO)
-        best = [self._settled(one) if plain > enough else one for plain, one in new[:LIKELIEST]]
+        best = [self._settled(one) for _, one in new[:LIKELIEST]]
         self.hypotheses += [refitted(self.grid, one, self.bench.facts) for one in best]
         self.hypotheses += [Hypothesis(one.causes, plain, rest, one) for plain, one in new[LIKELIEST:]]
         return [*best, *(one for _, one in new[LIKELIEST:])]

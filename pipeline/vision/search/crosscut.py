@@ -34,6 +34,8 @@ SEEN_SHARE = 0.4  # of the median contrast; from it on a section counts as seen
 _ARM_WIDTHS = 2.9  # widths from the middle to which what leaves a strip is followed: no bolt beside it reaches so far
 _ALIKE = 0.25  # of the step between strip and ground; grey levels nearer than that are those of one thing
 
+_TINT = 0.01  # of the square of the step; what channels scatter by on scales that a cell averages: JPEG keeps tints coarse
+
 _PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mask's middle half a width aside
 _PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer
 _PAIR_WANDER_COST = 0.5  # usual edges for each column moved; a mask wanders slowly, a jump to a shadow's edge must pay
@@ -199,16 +201,19 @@ def _level(relief: NDArray[np.floating], offsets: Array, flanks: Flanks, *parts:
 
 
 def _projection(straight: NDArray[np.float32], offset_widths: Array, covariance: Array) -> Array:
-    """Fisher's discriminant of core against flanks, kept from chasing channels that hardly differ."""
+    """Fisher's discriminant of core against flanks, in which shades of the sheath and shadows on the ground count least.
+
+    A lamp at one side darkens one edge until it is as dark as the ground, but hardly changes its colour.
+    """
     channels = straight.shape[2]
     if channels == 1:
         return np.ones(1)
-    ground, core = (
-        medians(straight[:, where].reshape(-1, channels), axis=0).astype(np.float64)
-        for where in (_beside(offset_widths), np.abs(offset_widths) < 0.35)
-    )
-    core -= ground
-    weights = np.linalg.solve(covariance + (0.1 * float(core @ core) + 1e-9) * np.eye(channels), core)
+    ground, sheath = _beside(offset_widths), np.abs(offset_widths) < _CORE[0][1]
+    core = medians(straight[:, sheath].reshape(-1, channels), axis=0).astype(np.float64)
+    core -= medians(straight[:, ground].reshape(-1, channels), axis=0)
+    across = medians(straight, axis=0)
+    shades = np.cov(across[sheath].T) + np.cov(across[ground].T)
+    weights = np.linalg.solve(covariance + shades + (_TINT * float(core @ core) + 1e-9) * np.eye(channels), core)
     # One sign convention: brightness counts positive, so "dark" means dark to a person wherever that makes sense.
     weights *= 1.0 if weights.sum() >= 0 else -1.0
     return np.asarray(weights / (np.abs(weights).sum() + 1e-300))
