@@ -195,8 +195,8 @@ def _inflation(fits: Sequence[_Fit]) -> float:
 def _sigmas(fits: Sequence[_Fit], floor: float) -> list[float]:
     """Standard deviation of a sample in each hold: common to all unless Bartlett's test at 1 % says they differ.
 
-    Where they differ each hold keeps its own, drawn with the weight of four samples toward the mean of their logarithms:
-    a variance from few samples is itself uncertain, and a single loud hold makes no quiet one uncertain.
+    Where they differ each hold keeps its own, drawn with the weight of four samples toward the mean of their
+    logarithms: a variance from few samples is itself uncertain, and a single loud hold makes no quiet one uncertain.
     """
     freedom = np.array([fit.freedom for fit in fits], dtype=np.float64)
     rss = np.array([float(fit.residuals @ fit.residuals) for fit in fits])
