@@ -226,9 +226,12 @@ class _Told:
         return [_Trial("sign", tuple(self.step[turned].tolist()), self._rest(sign)[0], -1.0)]
 
     def breaks(self) -> list[_Trial]:
-        """A factor or an offset from each step on that leaves two forces after it, and enough before it."""
+        """A factor or an offset from each step on that leaves two forces after it, and two before it.
+
+        At rest there is nothing to tare: what all forces under load have in common is a cause, and no break.
+        """
         found = []
-        for k in range(1, len(self.step) - 1):
+        for k in range(2, len(self.step) - 1):
             after = np.arange(len(self.step)) >= k
             if (self.loaded & after).sum() < 2:
                 continue
