@@ -34,7 +34,7 @@ SEEN_SHARE = 0.4  # of the median contrast; from it on a section counts as seen
 _ARM_WIDTHS = 2.9  # widths from the middle to which what leaves a strip is followed: no bolt beside it reaches so far
 _ALIKE = 0.25  # of the step between strip and ground; grey levels nearer than that are those of one thing
 
-_TINT = 0.01  # of the square of the step; what channels scatter by as a cell averages: JPEG keeps tints coarse
+_TINT = 0.003  # of the square of the step; what channels scatter by as a cell averages: JPEG keeps tints coarse
 
 _PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mask's middle half a width aside
 _PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer

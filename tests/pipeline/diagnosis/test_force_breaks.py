@@ -87,6 +87,12 @@ def test_a_zero_that_jumps(honest, first):
     assert found.corrections[0].offset == pytest.approx(0.3, abs=0.04)
 
 
+def test_what_all_forces_under_load_share_is_no_break(honest):
+    """At rest there is nothing to tare, so it is a cause: as a break it took a load in the plane, f_EI 21 % off."""
+    bench = prepare(faults_of_input(spoiled(honest["loop"], lambda i, force: force + 0.3 * (i >= 1))), SETTINGS)
+    assert force_break(bench) is None
+
+
 @pytest.fixture(scope="module")
 def either(honest):
     """A zero that jumps where all forces are of one size: a factor would do as well."""
