@@ -14,7 +14,7 @@ from pipeline.vision.centerline.measurement import follow_cable
 from pipeline.vision.render import Ground, Light, Sensor
 from pipeline.vision.scale.plane import PlaneMap
 from pipeline.vision.series import trace_series
-from tests.pipeline.vision.test_segmentation import DIAMETER, KNOWN, SCALE, find, scene, strand
+from tests.pipeline.vision.test_segmentation import DIAMETER, SCALE, find, scene, strand
 
 
 def traced(specimen, folder, photos):
