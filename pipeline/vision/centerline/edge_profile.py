@@ -133,8 +133,8 @@ def in_one_light(pixels: Pixels) -> tuple[Pixels, Array, Array]:
     return replace(pixels, value=alike), zero, gain
 
 
-def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) -> tuple[Profiles, Profiles | None]:
-    """Profiles in windows of neighbouring sections: with ramps, and for ``thin`` cables with ramps that are held.
+def fit_profiles(pixels: Pixels, s: Array, *, blur: float) -> Profiles:
+    """Profiles in windows of neighbouring sections, their ramps held to what lasts along a side.
 
     Medians over the rows come first: letters cover less than half of any line along the cable, and a mean would take
     them for the sheath.
@@ -156,9 +156,10 @@ def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) ->
         # Pixels are judged by the profile of the neighbourhood: light turns slowly, and letters fill some windows only.
         usual = _running_median(np.column_stack([start[:, 1], linear]))
         residual = _misfit(offset, value, np.column_stack([start[:, 0], usual]))
-        cost = (_scatter(residual[:, ::4]) / np.maximum(_USUAL_RAMP * np.abs(usual[:, 2]), 1e-9)) ** 2
         # every fourth pixel tells the usual scatter to a percent
-        limit = np.maximum(_PIXEL_OUTLIER * median(_scatter(residual[:, ::4])), _PLAIN_STEP * usual[:, 2:3])
+        noise = median(_scatter(residual[:, ::4]))
+        cost = (noise / np.maximum(_USUAL_RAMP * np.abs(usual[:, 2]), 1e-9)) ** 2
+        limit = np.maximum(_PIXEL_OUTLIER * noise, _PLAIN_STEP * usual[:, 2:3])
         keep = residual < limit
         # A window that contradicts its neighbourhood as a whole is judged by itself: nothing of it would be left.
         keep |= (keep.mean(axis=1) < _LEAST_PIXEL_SHARE)[:, None]
@@ -167,26 +168,23 @@ def fit_profiles(pixels: Pixels, s: Array, *, blur: float, thin: bool = True) ->
     plain, _ = _variable_projection(pooled, full, ramps=False)
     shift = full[:, 0] - plain[:, 0]
 
-    def profiles(used: Array, linear: Array) -> Profiles:
-        step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])[:, None]
-        shape = _running_median(np.column_stack([used[:, 1], linear[:, :2], linear[:, 2:] / step]))
-        by_side = shape.T.reshape(5, 2, count)
-        noise = _scatter(_misfit(offset, value, np.column_stack([used, linear])))
-        return Profiles(
-            s=s[chosen].reshape(count, each).mean(axis=1),
-            place=used[:, 0].reshape(2, count),
-            blur=by_side[0],
-            level=by_side[1],
-            step=by_side[2],
-            inside=by_side[3],
-            outside=by_side[4],
-            shift=shift.reshape(2, count),
-            noise=noise.reshape(2, count),
-            held=min(1.0, float(np.linalg.norm(full[:, 0] - used[:, 0]) / (np.linalg.norm(shift) + 1e-12))),
-        )
-
-    held = _variable_projection(pooled, full, ramps=True, cost=cost, about=_lasting(full_linear)) if thin else None
-    return profiles(full, full_linear), None if held is None else profiles(*held)
+    used, linear = _variable_projection(pooled, full, ramps=True, cost=cost, about=_lasting(full_linear))
+    step = np.where(linear[:, 1] == 0.0, np.nan, linear[:, 1])[:, None]
+    shape = _running_median(np.column_stack([used[:, 1], linear[:, :2], linear[:, 2:] / step]))
+    by_side = shape.T.reshape(5, 2, count)
+    left = _scatter(_misfit(offset, value, np.column_stack([used, linear])))
+    return Profiles(
+        s=s[chosen].reshape(count, each).mean(axis=1),
+        place=used[:, 0].reshape(2, count),
+        blur=by_side[0],
+        level=by_side[1],
+        step=by_side[2],
+        inside=by_side[3],
+        outside=by_side[4],
+        shift=shift.reshape(2, count),
+        noise=left.reshape(2, count),
+        held=min(1.0, float(np.linalg.norm(full[:, 0] - used[:, 0]) / (np.linalg.norm(shift) + 1e-12))),
+    )
 
 
 def _misfit(offset: Float32, value: Float32, profiles: Array) -> Float32:

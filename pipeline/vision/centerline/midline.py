@@ -59,11 +59,6 @@ _WIDTH_DEPARTURE = 0.08
 """Relative; a stretch whose width is farther from the usual one is left out: a cable's is constant within 5 %."""
 _EDGE_OUTLIER = 6.0  # robust standard deviations from the neighbouring edges; the other edge takes over
 _LONGEST_SIDE_PX = 12.0  # px; more sheath or ground than this adds texture, not knowledge of the edge
-_SMALL_RADIUS_PX = 15.0  # px; thinner cables leave little room for shading: ramps are held, see ramps_worth
-_RAMPS_WORTH = 1.5
-"""Ratio of the widths' errors by held ramps to those by free ones, above which a thin cable's edges get free ramps all
-the same: they double the scatter, which a ratio near 1 does not repay.
-"""
 _WIDTH_PLAY = 0.04
 """Of the width; so much it may be off the expected one throughout: scales and diameters are known to some percent, and
 what both edges are off alike leaves the midline in place.
@@ -154,8 +149,7 @@ def measure_sections(
     outline = found.outline if found is not None and waves else lambda s: np.full((2, len(s)), half_width)
     pixels = edge_pixels(closeup, curve, s, rows=rows, outline=outline, window=window)
     alike, zero, gain = in_one_light(pixels) if waves else (pixels, 0.0, 1.0)
-    free, held = fit_profiles(alike, s, blur=max(blur, 0.5), thin=half_width < _SMALL_RADIUS_PX)
-    profiles = held if held is not None and _serves(held, free, half_width, diameter) else free
+    profiles = fit_profiles(alike, s, blur=max(blur, 0.5))
     edges = fit_edges(pixels, s, profiles, zero=zero, gain=gain)
     place, std = edges.place.T, edges.std.T
     good = np.isfinite(place)
@@ -201,20 +195,6 @@ def measure_sections(
         blur=median(profiles.blur),
         softest=float(profiles.blur.min(axis=0).max()),
     )
-
-
-def _serves(held: Profiles, shaded: Profiles, half_width: float, diameter: float | None) -> bool:
-    """True unless widths by ramps that are held are far less constant, or less like the cable's, than by free ones."""
-
-    def unlike(profiles: Profiles) -> float:
-        # of most windows: one that fell on a cover's shadow says nothing of the others, and sections pass over it
-        width = profiles.place.sum(axis=0) + 2.0 * half_width
-        middle = median(width)
-        off = 0.0 if diameter is None else abs(middle - diameter)
-        spread = scatter(width, middle)
-        return float(np.hypot(spread, max(off - _WIDTH_PLAY * 2.0 * half_width, 0.0)))
-
-    return unlike(held) <= _RAMPS_WORTH * unlike(shaded)
 
 
 def _of_usual_width(width: Array) -> NDArray[np.bool_]:

@@ -36,7 +36,7 @@ def pixels_of(place, rng, *, noise, sections=240, rows=4, inside=0.0, outside=0.
 
 def fitted(pixels):
     s = np.arange(pixels.value.shape[1]) * 8.0
-    profiles, _ = fit_profiles(pixels, s, blur=0.8)
+    profiles = fit_profiles(pixels, s, blur=0.8)
     return profiles, fit_edges(pixels, s, profiles)
 
 
