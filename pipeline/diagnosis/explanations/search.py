@@ -150,13 +150,17 @@ class Search:
 
     def _with_others(self, one: Explanation) -> list[Explanation]:
         """A single cause with each of the two that score most beside it, and of those that are likely by the scores."""
-        second, own = self.beside(one), self.weighed_beside(one)
-        mine = next((known.plain for known in self.hypotheses if known.found is one), own.own.plain) - own.own.plain
-        further = {cause: plain + mine for cause, (plain, _) in own.further.items()}
+        promised = self._promised(one)
         rivals = [known.plain for known in self.hypotheses if known.found is not None]
-        enough = np.logaddexp.reduce([*further.values(), *rivals]) + np.log(ALSO)
-        likely = [cause for cause, plain in further.items() if plain > enough]
-        return self._pairs_beside(one, [*dict.fromkeys([*candidates(second)[:2], *likely])])
+        enough = np.logaddexp.reduce([*promised.values(), *rivals]) + np.log(ALSO)
+        likely = [cause for cause, plain in promised.items() if plain > enough]
+        return self._pairs_beside(one, [*dict.fromkeys([*candidates(self.beside(one))[:2], *likely])])
+
+    def _promised(self, one: Explanation) -> dict[int, float]:
+        """Log evidence that the linear model promises of a single cause with every other one beside it."""
+        beside = self.weighed_beside(one)
+        mine = next((known.plain for known in self.hypotheses if known.found is one), beside.own.plain)
+        return {cause: plain + mine - beside.own.plain for cause, (plain, _) in beside.further.items()}
 
     def _pairs_beside(self, one: Explanation, causes: Sequence[int]) -> list[Explanation]:
         named = (known.found for known in self.hypotheses if known.found is not None and not known.found.unnamed)
@@ -249,11 +253,10 @@ class Search:
 
     def pairs_speak(self, best: Explanation) -> bool:
         """Whether the data make, or may make, two causes or something else likelier than they were beforehand."""
-        second, beside, rest = self.beside(best), self.weighed_beside(best), self.hypotheses[0].rest
-        mine = next(one.plain for one in self.hypotheses if one.found is best)
-        for cause, (plain, _) in beside.further.items():
+        second, rest = self.beside(best), self.hypotheses[0].rest
+        for cause, plain in self._promised(best).items():
             if cause not in best.causes and second.statistic[second.of(cause)].max() > NEEDED:
-                self.hypotheses.append(Hypothesis((*best.causes, cause), plain + mine - beside.own.plain, rest))
+                self.hypotheses.append(Hypothesis((*best.causes, cause), plain, rest))
         believed = self.posterior
         beforehand = sum(SHARES[2]) + sum(something_else for _, something_else in SHARES.values())
         return believed.total(count=2) + believed.total(something_else=True) > beforehand
