@@ -48,6 +48,9 @@ FREER = 5.0
 PLACES = 8
 """Of the third, over the abscissa: no change is farther from the middle of one than a seventh of it."""
 
+ROUNDING = 1e-11
+"""Of the scale of an unknown: what falls below is rounding."""
+
 Forms = Literal["rough", "even", "all"]
 """Rough laws; these and the smooth ones, which change alike everywhere; and the quick ones as well."""
 
@@ -239,12 +242,10 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
     a : (p,)
     one : Family
     """
-    scales, axes = np.linalg.eigh(schur + one.fixed + one.form)
-    # where rounding is all that data and prior tell, it must not become a negative variance
-    scales = np.maximum(scales, len(a) * np.finfo(float).eps * scales[..., -1:])
-    root = axes / np.sqrt(scales)[..., None, :]
-    share, turned = np.linalg.eigh(root.swapaxes(-1, -2) @ one.form @ root)
-    vectors = root @ turned
+    root, log_det = inverse_root(schur + one.fixed + one.form)
+    turn = root.swapaxes(-1, -2)
+    share, turned = np.linalg.eigh(root @ one.form @ turn)
+    vectors = turn @ turned
     share, tau = np.clip(share, 0.0, 1.0)[..., None, :], TAUS[:, None]
     precisions = (1.0 - share) + share / tau**2
     turn = vectors.swapaxes(-1, -2)
@@ -253,6 +254,16 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
     toward = (turn @ pull)[..., None, :, :] - known
     prior = a @ (one.fixed @ a) + (a @ (one.form @ a)) / TAUS**2
     gained = np.sum(toward**2 / precisions[..., None], axis=-2) - prior[:, None]
-    log_det = np.sum(np.log(precisions), axis=-1) + np.sum(np.log(scales), axis=-1)[..., None]
+    log_det = np.sum(np.log(precisions), axis=-1) + log_det[..., None]
     evidence = (one.log_norms - 0.5 * log_det)[..., None] + 0.5 * gained
     return Conditioned(vectors, precisions, toward / precisions[..., None], evidence)
+
+
+def inverse_root(H: Array) -> tuple[Array, Array]:
+    """W (..., r, r) with W' W = H^-1, and log|H| (...)."""
+    shown = np.diagonal(H, axis1=-2, axis2=-1)
+    scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
+    whole = H / (scale[..., :, None] * scale[..., None, :]) + ROUNDING * np.eye(H.shape[-1])
+    root = np.asarray(np.linalg.cholesky(whole), dtype=np.float64)
+    log_det = 2.0 * np.log(np.diagonal(root, axis1=-2, axis2=-1) * scale).sum(axis=-1)
+    return np.linalg.inv(root) / scale[..., None, :], log_det

@@ -120,13 +120,12 @@ class Fit:
 def fit(
     observation: Observation,
     extension: Extension,
-    start: Array,
+    start: Array | State | Fit,
     *,
     iterations: int = ITERATIONS,
     tolerance: float = TOLERANCE,
     near: Run | None = None,
     cutoff: float = 1e-7,
-    begin: Fit | None = None,
     kept: NDArray[np.bool_] | None = None,
     hopeless: float = np.inf,
 ) -> Fit:
@@ -136,7 +135,8 @@ def fit(
     ----------
     observation : Observation
     extension : Extension
-    start : (p,)
+    start : (p,), State or Fit
+        Where to begin: a vector, or what is known already of this model and this observation at one.
     iterations : int
         At most.
     tolerance : float
@@ -145,8 +145,6 @@ def fit(
         Run of a similar model, for warm starts.
     cutoff : float
         Combinations of parameters that show less than this share of the clearest one stay where they are.
-    begin : Fit or None
-        Fit of this model to this observation, to go on from: nothing is computed anew at its vector.
     kept : (N,) bool or None
         Rows the model is fitted to; all of them are predicted.
     hopeless : float
@@ -158,11 +156,13 @@ def fit(
     Fit
         ``converged`` is False if the iterations ran out or the start has no equilibrium.
     """
-    if begin is None:
-        begin = evaluated(observation, extension, np.asarray(start, dtype=float), near)
-        if begin.run.prediction is None:
+    if isinstance(start, Fit):
+        begin, state = start, State(start.vector, extension.base_model(start.vector), start.run, start.residual)
+    else:
+        state = start if isinstance(start, State) else shown(observation, extension, np.asarray(start, float), near)
+        begin = _with_jacobian(observation, extension, state)
+        if state.run.prediction is None:
             return begin
-    state = _State(begin.vector, extension.base_model(begin.vector), begin.run, begin.residual)
     jacobian = begin.jacobian
     rows = np.ones(len(state.residual), dtype=bool) if kept is None else kept
     converged, damping, crawled, falls = False, 0.0, 0, [np.inf, np.inf]
@@ -199,7 +199,7 @@ def fit(
 def fit_from(
     observation: Observation,
     extension: Extension,
-    start: Array,
+    start: Array | State,
     near: Fit,
     *,
     hopeless: float = np.inf,
@@ -208,38 +208,51 @@ def fit_from(
     return fit(observation, extension, start, near=near.run, hopeless=hopeless)
 
 
-def evaluated(observation: Observation, extension: Extension, vector: Array, near: Run | None) -> Fit:
-    """The model at a vector (p,), not fitted; without residual and Jacobian where it has no equilibrium there."""
-    base_model = extension.base_model(vector)
-    here = run(extension.model(vector, of=base_model), extension.facts, near=near)
-    value = whole_residual(observation, here.prediction, vector, extension.prior)
-    if value is None:
-        return Fit(extension, vector, here, np.zeros(0), np.zeros((0, extension.size)), False)
-    jacobian = sensitivities(observation, extension, vector, base_model, here)
-    return Fit(extension, vector, here, value, jacobian, False)
-
-
-class _State(NamedTuple):
-    """A vector with its base model, its run and its residual."""
+class State(NamedTuple):
+    """A model at a vector (p,): without its terms, its run, and the residual (N,), of no length without equilibrium."""
 
     vector: Array
     base_model: Model
     run: Run
     residual: Array
 
-    def cost(self, rows: NDArray[np.bool_]) -> float:
-        """Sum of squares of the named rows."""
-        return float(np.sum(self.residual[rows] ** 2))
+    def cost(self, rows: NDArray[np.bool_] | None = None) -> float:
+        """Sum of squares, of the named rows; infinite without equilibrium."""
+        if self.run.prediction is None:
+            return np.inf
+        return float(np.sum((self.residual if rows is None else self.residual[rows]) ** 2))
+
+
+def shown(
+    observation: Observation, extension: Extension, vector: Array, near: Run | None, *, patient: bool = True
+) -> State:
+    """What a model shows at a vector (p,); for ``near`` and ``patient`` see `rod.inverse.simulation.run`."""
+    base_model = extension.base_model(vector)
+    here = run(extension.model(vector, of=base_model), extension.facts, near=near, patient=patient)
+    value = whole_residual(observation, here.prediction, vector, extension.prior)
+    return State(vector, base_model, here, np.zeros(0) if value is None else value)
+
+
+def evaluated(observation: Observation, extension: Extension, vector: Array, near: Run | None) -> Fit:
+    """The model at a vector (p,), not fitted; without residual and Jacobian where it has no equilibrium there."""
+    return _with_jacobian(observation, extension, shown(observation, extension, vector, near))
+
+
+def _with_jacobian(observation: Observation, extension: Extension, at: State) -> Fit:
+    jacobian = np.zeros((0, extension.size))
+    if at.run.prediction is not None:
+        jacobian = sensitivities(observation, extension, at.vector, at.base_model, at.run)
+    return Fit(extension, at.vector, at.run, at.residual, jacobian, False)
 
 
 def _lower(
     observation: Observation,
     extension: Extension,
-    state: _State,
+    state: State,
     linear: Linearised,
     damping: float,
     rows: NDArray[np.bool_],
-) -> tuple[_State, float] | None:
+) -> tuple[State, float] | None:
     """First state of lower chi-square, and the damping that led there; None where eight trials find none.
 
     A whole step first; then a part of it, which follows a curved valley where damping would creep along its wall; then
@@ -250,9 +263,7 @@ def _lower(
         trial = extension.brought_inside(state.vector + share * linear.step(used))
         if not extension.admissible(trial):
             continue
-        base_model = extension.base_model(trial)
-        there = run(extension.model(trial, of=base_model), extension.facts, near=state.run, patient=False)
-        value = whole_residual(observation, there.prediction, trial, extension.prior)
-        if value is not None and np.sum(value[rows] ** 2) < state.cost(rows):
-            return _State(trial, base_model, there, value), used
+        there = shown(observation, extension, trial, state.run, patient=False)
+        if there.cost(rows) < state.cost(rows):
+            return there, used
     return None

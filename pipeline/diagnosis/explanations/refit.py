@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.fits.search import TRACE, Suspicion
 from pipeline.diagnosis.posterior.products import WORSE
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import FAR, Fit, fit_from
+from rod.inverse.fit import FAR, Fit, State, fit_from, shown
 from rod.inverse.observation import Observation
-from rod.inverse.sensitivities import whole_residual
-from rod.inverse.simulation import run
 
 Array = NDArray[np.float64]
 
@@ -124,10 +122,11 @@ def cost(fitted: Fit) -> float:
     return fitted.chi2 + 2.0 * fitted.extension.size
 
 
-def linear_start(observation: Observation, added: Addition) -> Array:
-    """Start of a refit: the share of the linear estimate that fits best, the other parameters moved along with it.
+def linear_start(observation: Observation, added: Addition) -> Array | State:
+    """Start of a refit: the largest share of the linear estimate that brings the model nearer to the data.
 
-    Parameters that stayed would keep the place of the cause; only the last, smallest trial leaves them.
+    The other parameters are moved along: those that stayed would keep the place of the cause. The last, smallest trial
+    leaves them. Where none comes nearer, the one that goes least astray.
     """
     base, extension = added.base, added.extension
     size = np.linalg.norm(base.jacobian, axis=0)
@@ -136,18 +135,15 @@ def linear_start(observation: Observation, added: Addition) -> Array:
     move = np.linalg.lstsq(base.jacobian / size, left, rcond=1e-7)[0] / size
     trials = [added.start(base.vector + share * move, share=share) for share in SHARES]
     trials.append(added.start(base.vector, share=SHARES[-1]))
-    costs = [_cost_at(observation, extension, trial, base) for trial in trials]
+    best: State | None = None
+    for trial in trials:
+        if extension.admissible(trial):
+            there = shown(observation, extension, trial, base.run, patient=False)
+            best = there if best is None or there.cost() < best.cost() else best
+            if best.cost() < base.chi2:
+                break
     # where none has an equilibrium, the last one is at least a possible cable: whole moves may leave every range
-    return trials[int(np.argmin(costs)) if np.isfinite(min(costs)) else -1]
-
-
-def _cost_at(observation: Observation, extension: Extension, vector: Array, near: Fit) -> float:
-    """Chi-square of a model at a vector; infinite where that is impossible or has no equilibrium."""
-    if not extension.admissible(vector):
-        return np.inf
-    shown = run(extension.model(vector), extension.facts, near=near.run, patient=False)
-    value = whole_residual(observation, shown.prediction, vector, extension.prior)
-    return np.inf if value is None else float(value @ value)
+    return trials[-1] if best is None or best.run.prediction is None else best
 
 
 def _elsewhere(added: Addition) -> list[tuple[Array, bool]]:

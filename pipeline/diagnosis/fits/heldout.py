@@ -59,10 +59,9 @@ def _refit(observation: Observation, model: Fit, left_out: NDArray[np.bool_]) ->
     return fit(
         observation,
         model.extension,
-        model.vector,
+        model,
         iterations=STEPS_WITHOUT,
         cutoff=1e-4,  # what the remaining steps cannot tell stays where it was, and counts for neither model
-        begin=model,
         kept=np.r_[~left_out, priors],
     )
 

@@ -20,14 +20,11 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.products import Products
 from rod.inverse.fit import Fit
-from rod.law_prior import Conditioned, conditioned
+from rod.law_prior import Conditioned, conditioned, inverse_root
 
 Array = NDArray[np.float64]
 
-ROUNDING = 1e-11
-"""Of the scale of an unknown: what falls below is rounding."""
-
-NOTHING = 30.0
+NOTHING = 20.0
 """Of log p: what lies so far below the largest is nothing whatever the prior of an amount makes of it."""
 
 LOG_2PI = float(np.log(2.0 * np.pi))
@@ -68,7 +65,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     several, size = residuals.shape[1], fitted.extension.base.law.size
     products, normal = _products(grid, fitted, more, residuals)
     law = slice(several, several + size)
-    half, log_det = _inverse_root(products.own[:, law.stop :, law.stop :])
+    half, log_det = inverse_root(products.own[:, law.stop :, law.stop :])
     pull, across = np.split(half @ products.own[:, law.stop :, : law.stop], [several], axis=2)
     schur = products.own[:, law, law] - across.swapaxes(1, 2) @ across
     pulls = products.own[:, law, :several] - across.swapaxes(1, 2) @ pull
@@ -120,21 +117,11 @@ def of_known_size(grid: ErrorGrid, fitted: Fit) -> tuple[Array, Array]:
     return rows[:, fitted.beyond_log], rows[:, base.rig_at] * np.array(base.rig_std)
 
 
-def _inverse_root(H: Array) -> tuple[Array, Array]:
-    """W (G, r, r) with W' W = H^-1, and log|H| (G,)."""
-    shown = np.einsum("gii->gi", H)
-    scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
-    whole = H / (scale[:, :, None] * scale[:, None, :])
-    np.einsum("gii->gi", whole)[:] += ROUNDING
-    root = np.asarray(np.linalg.cholesky(whole), dtype=np.float64)
-    return np.linalg.inv(root) / scale[:, None], 2.0 * np.log(np.einsum("gii->gi", root) * scale).sum(axis=1)
-
-
 def _by_one_prior(fitted: Fit, schur: Array, pulls: Array) -> Array:
     """What the law adds to log p (G, d) by the one prior that the fit holds it by, up to a constant."""
     base = fitted.extension.base
     wide = base.law.prior().T @ base.law.prior()
-    half, log_det = _inverse_root(schur + wide)
+    half, log_det = inverse_root(schur + wide)
     toward = half @ (pulls - (wide @ fitted.vector[: len(wide)])[:, None])
     return np.asarray(0.5 * (np.sum(toward**2, axis=1) - log_det[:, None]))
 

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import rod.inverse.fit as fits
 from fixtures.continuum import Cable
 from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.memory import Slipping
 from fixtures.scores import refit_one
 from pipeline.diagnosis.causes import SUSPECTS
-from pipeline.diagnosis.explanations import refit
 from pipeline.diagnosis.explanations.refit import Addition, linear_start
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.workbench import prepare
@@ -108,7 +108,7 @@ def test_a_cause_that_would_have_to_be_impossibly_large_is_told_as_such():
 
 def test_a_start_is_a_possible_cable_where_none_tried_has_an_equilibrium(plain, monkeypatch):
     """A whole linear move had left the range of a slip, and the refit began with a negative one."""
-    monkeypatch.setattr(refit, "run", lambda *_, **__: SimpleNamespace(prediction=None))
+    monkeypatch.setattr(fits, "run", lambda *_, **__: SimpleNamespace(prediction=None))
     direction = int(plain.suspicion.of([cause.name for cause in SUSPECTS].index("hysteresis"))[0])
     term = plain.suspicion.terms[direction]
     added = Addition(plain.base, term, 1.0, 1e9 * plain.suspicion.columns[:, direction])
@@ -123,13 +123,12 @@ def test_rows_left_out_of_a_refit_do_not_matter(plain):
         fit(
             observation,
             plain.base.extension,
-            plain.base.vector,
+            begin,
             iterations=10,
             tolerance=1e-3,
             kept=kept,
-            begin=begin,
         )
-        for observation, begin in ((plain.observation, plain.base), (spoilt, None))
+        for observation, begin in ((plain.observation, plain.base), (spoilt, plain.base.vector))
     ]
     # both end within the tolerance of the same minimum: a thirtieth of a standard deviation
     std = np.sqrt(np.diag(plain.base.covariance))
