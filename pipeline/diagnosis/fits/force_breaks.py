@@ -46,50 +46,43 @@ or lost zero; what slips or creeps changes as much at once."""
 EXPLAINED = 0.10
 """Share of the excess misfit that a fault of the data may leave."""
 
-ZEROED = 4.0
-"""Standard deviations: a force-free step that reads less shows that the load cell was zeroed before the break."""
-
 DEAD = 0.05
 """Share of its force below which a load cell measures nothing: noise of 0.3 % of its range would be 6 % of a force that
 is corrected, and what a broken channel still shows (an offset, crosstalk) is of this size."""
 
-NO_FACTOR = 4.0
-"""Standard deviations: a factor nearer to zero than that, or its inverse, may be none at all."""
+SHOWN = 4.0
+"""Standard deviations: a factor nearer to zero than that, or its inverse, may be none at all; a force-free step that
+reads less shows that the load cell was zeroed before the break."""
 
 UNTOLD = 9.0
 """Chi-square: three standard deviations. A factor and an offset nearer than that are not told apart."""
 
 
-@dataclass(frozen=True)
-class Break:
-    """What forces do from one step on, or at some steps.
+class Break(NamedTuple):
+    """What forces do from one step on, or at some steps, as fitted.
 
     Attributes
     ----------
     kind : str
-        ``factor``, ``zero`` or ``sign``.
+        ``factor``, ``zero`` or ``sign``; ``one`` for a single bad force, ``none``.
     steps : tuple of int
         Indices of the steps that differ from the others.
+    rest : float
+        Chi-square it leaves.
     amount, std : float
         Factor (-), or offset (N).
-    gain : float
-        Chi-square it removes beyond its own parameter.
-    rest, freedom : float
-        Chi-square it leaves, and what noise would.
     """
 
     kind: str
     steps: tuple[int, ...]
-    amount: float
-    std: float
-    gain: float
     rest: float
-    freedom: int
+    amount: float = -1.0
+    std: float = 0.0
 
     @property
     def dead(self) -> bool:
         """Whether the forces on one side of the break are none at all."""
-        return self.kind == "factor" and (abs(self.amount) < max(DEAD, NO_FACTOR * self.std))
+        return self.kind == "factor" and (abs(self.amount) < max(DEAD, SHOWN * self.std))
 
 
 def force_break(bench: Workbench) -> tuple[Faults, float] | None:
@@ -100,40 +93,24 @@ def force_break(bench: Workbench) -> tuple[Faults, float] | None:
     told = _Told.by_photos(bench)
     if told is None:
         return None
-    whole, single = told.whole(), told.without_one()
-    found = [_break(told, trial, whole) for trial in (*told.signs(), *told.breaks())]
-    fault = FAULT**2
-    best = max(found, key=lambda one: one.gain, default=None)
-    if best is None:
+    whole, single = told.fitted("none"), min((told.fitted("one", k) for k in range(len(told.step))), key=_rest)
+    breaks, sign = told.breaks(), told.turned()
+    best = min(breaks, key=_rest, default=None)
+    if sign is not None and (best is None or sign.rest < best.rest + FAULT**2):
+        best, breaks = sign, []
+    elif best is None or best.rest + 1.0 > single.rest - FAULT**2:
         return None
-    turned = next((one for one in found if one.kind == "sign" and one.gain > best.gain - fault), None)
-    if turned is None and best.gain < whole.rest - single.rest + fault:
+    freedom = len(told.residual) + len(told.force) - told.photos.shape[1] - (best is not sign)
+    if best.rest > freedom + 4.0 * np.sqrt(2.0 * freedom) + EXPLAINED * (whole.rest - best.rest):
         return None
-    best = turned or best
-    noise = best.freedom + 4.0 * np.sqrt(2.0 * best.freedom) + EXPLAINED * best.gain
-    if best.rest > noise:
-        return None
-    others = (one for one in found if one.steps == best.steps and one.kind not in ("sign", best.kind))
-    other = None if turned else next((one for one in others if one.rest < best.rest + UNTOLD), None)
+    others = (one for one in breaks if one.steps == best.steps and one.kind != best.kind)
+    other = next((one for one in others if one.rest < best.rest + UNTOLD), None)
     dead = next((one for one in (best, other) if one is not None and one.dead), None)
     return (_as_fault(bench.test, best, other) if dead is None else _without_dead(bench.test, dead)), best.rest
 
 
-class _Trial(NamedTuple):
-    """A hypothesis fitted: what it leaves, the size of its break and how well that is known."""
-
-    kind: str
-    steps: tuple[int, ...]
-    rest: float
-    amount: float = 1.0
-    std: float = 0.0
-
-
-def _break(told: _Told, trial: _Trial, whole: _Trial) -> Break:
-    own = 0 if trial.kind == "sign" else 1
-    freedom = len(told.residual) + len(told.force) - told.photos.shape[1] - own
-    gain = whole.rest - trial.rest - own
-    return Break(trial.kind, trial.steps, trial.amount, trial.std, gain, trial.rest, freedom)
+def _rest(found: Break) -> float:
+    return found.rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +127,7 @@ class _Told:
         Of the model's forces.
     residual, photos : (m,), (m, p)
         Whitened rows of photos and priors at the fit to them, and their sensitivities.
+    loaded : (n,) bool
     """
 
     step: NDArray[np.int_]
@@ -203,29 +181,15 @@ class _Told:
             np.array([branch[i] != "mounted" for i in steps]),
         )
 
-    def whole(self) -> _Trial:
-        """No break at all."""
-        return _Trial("none", (), self._rest(np.ones(len(self.force)))[0])
+    def turned(self) -> Break | None:
+        """Forces with the signs as measured, if some under load are negative: those that pull are the wrong ones.
 
-    def without_one(self) -> _Trial:
-        """All but the force that fits worst."""
-        trials = []
-        for i, step in enumerate(self.step.tolist()):
-            weight = np.ones(len(self.force))
-            weight[i] = 0.0
-            trials.append(_Trial("one", (step,), self._rest(np.ones(len(self.force)), weight=weight)[0]))
-        return min(trials, key=lambda trial: trial.rest)
-
-    def signs(self) -> list[_Trial]:
-        """Forces with the signs as measured, if some under load are negative."""
+        A cable that is pushed together pushes back, be the wrong ones many or few.
+        """
         turned = self.loaded & (self.force * self.model < 0.0)
-        if not turned.any() or turned.sum() == self.loaded.sum():
-            return []
-        sign = np.where(turned, -1.0, 1.0)
-        # a cable that is pushed together pushes back: those that pull are the wrong ones, be they many or few
-        return [_Trial("sign", tuple(self.step[turned].tolist()), self._rest(sign)[0], -1.0)]
+        return self.fitted("sign", turned) if turned.any() and turned.sum() < self.loaded.sum() else None
 
-    def breaks(self) -> list[_Trial]:
+    def breaks(self) -> list[Break]:
         """A factor or an offset from each step on that leaves two forces after it, and two before it.
 
         At rest there is nothing to tare: what all forces under load have in common is a cause, and no break.
@@ -233,60 +197,39 @@ class _Told:
         found = []
         for k in range(2, len(self.step) - 1):
             after = np.arange(len(self.step)) >= k
-            if (self.loaded & after).sum() < 2:
-                continue
-            steps = tuple(self.step[after].tolist())
-            if (self.loaded & ~after).sum() > 1:
-                rest, factor, std = self._factor(after)
-                if abs(factor - 1.0) > SWITCHED:
-                    found.append(_Trial("factor", steps, rest, factor, std))
-            rest, offset, std = self._offset(after)
-            if abs(offset) > SWITCHED * np.max(np.abs(self.force)):
-                found.append(_Trial("zero", steps, rest, offset, std))
-        return found
+            if (self.loaded & after).sum() > 1:
+                found.append(self.fitted("zero", after))
+                if (self.loaded & ~after).sum() > 1:
+                    found.append(self.fitted("factor", after))
+        least = SWITCHED * np.max(np.abs(self.force))
+        return [b for b in found if (abs(b.amount) > least if b.kind == "zero" else abs(b.amount - 1.0) > SWITCHED)]
 
-    def _factor(self, after: NDArray[np.bool_]) -> tuple[float, float, float]:
-        """Chi-square left by a factor after a break, the factor and its standard deviation."""
-        before = self._scale(~after)
-        factor = self._scale(after) / before if before else 1.0
-        rest = std = np.inf
-        for _ in range(3):  # the product of factor and model is linear in either alone
-            course = np.where(after, factor, 1.0)
-            rest, change, std = self._rest(course, np.where(after, before * self.model, 0.0), scale=before)
-            factor += change
-        return rest, factor, std
+    def fitted(self, kind: str, at: NDArray[np.bool_] | int | None = None) -> Break:
+        """One kind of break ``at`` some forces, fitted: F = (model + slopes v) (c + a there), or with a beside it.
 
-    def _offset(self, after: NDArray[np.bool_]) -> tuple[float, float, float]:
-        """Chi-square left by an offset after a break, the offset and its standard deviation, N."""
-        columns = np.column_stack([self.model, after.astype(float)]) / self.std[:, None]
-        scale = float(np.linalg.lstsq(columns, self.force / self.std, rcond=None)[0][0])
-        return self._rest(np.ones(len(self.force)), after.astype(float), scale=scale)
-
-    def _scale(self, where: NDArray[np.bool_], course: Array | float = 1.0) -> float:
-        """Factor of the model's forces that fits the measured ones best, without a look at the photos."""
-        weight = np.where(where, 1.0 / self.std, 0.0)
-        model = weight * course * self.model
-        return float(model @ (weight * self.force) / max(float(model @ model), 1e-300))
-
-    def _rest(
-        self, course: Array, column: Array | None = None, *, scale: float | None = None, weight: Array | float = 1.0
-    ) -> tuple[float, float, float]:
-        """Chi-square left by ``F = scale course model`` plus a free amount of ``column``; amount and std."""
-        if scale is None:
-            scale = self._scale(np.broadcast_to(np.asarray(weight) > 0.0, self.force.shape), course)
-        whiten = weight / self.std
-        own = (whiten * (self.force - scale * course * self.model), (whiten * scale * course)[:, None] * self.slopes)
-        extra = np.zeros(len(self.force)) if column is None else whiten * column
-        matrix = np.block([[self.photos, np.zeros((len(self.photos), 1))], [own[1], extra[:, None]]])
-        data = np.r_[self.residual, own[0]]
+        The model's own level is the scale of its forces, so c stays where the forces alone bring it.
+        """
+        there = np.zeros(len(self.force))
+        there[slice(0) if at is None else at] = 1.0
+        force = np.where(there, -self.force, self.force) if kind == "sign" else self.force
+        extra = {"factor": there * self.model, "zero": there, "one": there}.get(kind, np.zeros(len(there)))
+        columns = np.column_stack([self.model, extra]) / self.std[:, None]
+        c, a = np.linalg.lstsq(columns, force / self.std, rcond=None)[0]
+        course = c + a * there if kind == "factor" else np.full(len(there), c)
+        rows = np.column_stack([course[:, None] * self.slopes, extra]) / self.std[:, None]
+        matrix = np.vstack([np.column_stack([self.photos, np.zeros(len(self.photos))]), rows])
+        data = np.r_[self.residual, force / self.std - columns @ (c, a)]
         size = np.linalg.norm(matrix, axis=0)
         size = np.where(size > 0.0, size, 1.0)
         left, weights, right = np.linalg.svd(matrix / size, full_matrices=False)
         seen = weights > 1e-9 * weights[0]
         along = left[:, seen].T @ data
         root = right[seen].T / weights[seen]
-        rest = float(data @ data - along @ along)
-        return rest, float(root[-1] @ along / size[-1]), float(np.linalg.norm(root[-1]) / size[-1])
+        amount, std = a + root[-1] @ along / size[-1], np.linalg.norm(root[-1]) / size[-1]
+        if kind == "factor":
+            amount, std = 1.0 + amount / c, std / abs(c)
+        steps, rest = tuple(self.step[there > 0.0].tolist()), float(data @ data - along @ along)
+        return Break(kind, steps, rest) if kind == "sign" else Break(kind, steps, rest, float(amount), float(std))
 
 
 def _as_fault(test: MeasuredTest, found: Break, other: Break | None) -> Faults:
@@ -347,4 +290,4 @@ def _size(found: Break) -> Message:
 def _zeroed(test: MeasuredTest, found: Break) -> bool:
     """Whether a force-free step before the break shows that the load cell read zero then."""
     before = (step for i, step in enumerate(test.steps) if i not in found.steps and step.branch == "mounted")
-    return any(abs(step.force) < ZEROED * step.force_std for step in before)
+    return any(abs(step.force) < SHOWN * step.force_std for step in before)
