@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtri
 
 from pipeline.identify.identification import Identification
 from pipeline.messages import Message, ended
@@ -15,20 +15,11 @@ from rod.balance import BalanceOutcome
 from rod.inverse import InverseOutcome
 from rod.measurement import MeasuredTest
 
-PRE_CURVATURE_SIGMA = 3.5
-"""Standard deviations between two sources of K0 (photo, balance, inverse): of three pairs, one false in 700."""
+CHANCE = 1e-4
+"""Of noise alone that one comparison is told as a contradiction: rare over the twenty of a test, and over many."""
 
-CHORD_SIGMA = 4.0
-"""Standard deviations of chord against displacement: a false one in 2,000 tests of eight steps."""
-
-NUISANCE_SIGMA = 3.5
-"""Standard deviations of the fitted length or scale from what was given: a false one in 1,000 tests."""
-
-FORCE_ZERO_SIGMA = 4.0
-"""Standard deviations of the force of the force-free step from 0: a false one in 16,000 tests."""
-
-MISFIT_LEVEL = 1e-4
-"""Probability below which residuals count as beyond noise: rare even over many photos."""
+SIGMA = float(ndtri(1.0 - 0.5 * CHANCE))
+"""Standard deviations that correspond."""
 
 BRANCH_LEVEL = 0.01
 """Level of the test whether loading and unloading show the same characteristic."""
@@ -69,7 +60,7 @@ def _open(kappa: float | None, std: float) -> Message:
 def force_findings(test: MeasuredTest) -> Iterator[Finding]:
     """The load cell's zero in the force-free step."""
     for step in test.steps:
-        if step.branch == "mounted" and abs(step.force) > FORCE_ZERO_SIGMA * step.force_std:
+        if step.branch == "mounted" and abs(step.force) > SIGMA * step.force_std:
             z = abs(step.force) / step.force_std
             yield doubtful("identify/force-zero", force_N=(step.force, step.force_std), step=step.step, z=z)
 
@@ -87,7 +78,7 @@ def chord_findings(test: MeasuredTest, settings: IdentifySettings) -> Iterator[F
     off = chord + moved - zero
     worst = int(np.argmax(np.abs(off) / std))
     # The scale of the photos may be off by its own standard deviation; its part grows with the way.
-    allowed = CHORD_SIGMA * np.hypot(std[worst], test.scale_std * np.ptp(moved))
+    allowed = SIGMA * np.hypot(std[worst], test.scale_std * np.ptp(moved))
     if abs(off[worst]) > allowed:
         if np.ptp(moved) == 0.0:
             yield doubtful("identify/chord-displacement.one", spread_m=np.ptp(chord))
@@ -110,7 +101,7 @@ def _pre_curvature(found: Identification) -> Iterator[Finding]:
     photo, photo_std = sources["photo"]
     for name, (value, std) in sources.items():
         z = abs(value - photo) / np.hypot(std, photo_std)
-        if name != "photo" and z > PRE_CURVATURE_SIGMA:
+        if name != "photo" and z > SIGMA:
             seen = {"photo_per_m": photo, "photo_std_per_m": photo_std, "value_per_m": value, "std_per_m": std}
             yield doubtful(f"identify/pre-curvature-{name}", **seen, z=z)
 
@@ -127,16 +118,16 @@ def pre_curvature_sources(found: Identification) -> dict[str, tuple[float, float
 def _nuisances(found: Identification) -> Iterator[Finding]:
     for name, (value, _, before) in found.inverse.nuisances.items():
         z, given = abs(value) / before, found.test.length
-        if z > NUISANCE_SIGMA and name == "length":
+        if z > SIGMA and name == "length":
             yield doubtful("identify/length", fitted_m=given + value, given_m=given, z=z)
-        elif z > NUISANCE_SIGMA and name == "scale":
+        elif z > SIGMA and name == "scale":
             yield doubtful("identify/scale", change=value, z=z)
 
 
 def _misfit(found: Identification) -> Iterator[Finding]:
     for kind in ("shape", "force"):
         chi2, count = found.inverse.chi2(kind)
-        if count and chdtrc(count, chi2) < MISFIT_LEVEL:
+        if count and chdtrc(count, chi2) < CHANCE:
             yield doubtful(f"identify/misfit-{kind}", rms=np.sqrt(chi2 / count))
 
 
