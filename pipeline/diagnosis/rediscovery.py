@@ -161,5 +161,5 @@ def _gain(
     if before.run.prediction is None:
         return None
     suspicion = suspect(observation, before, ())
-    bench = Workbench(test, facts, observation, before, suspicion, suspicion, np.zeros(1), 0.0)
+    bench = Workbench(test, facts, observation, before, suspicion, suspicion, 0.0)
     return measured_gain(bench, after, settings)

@@ -166,16 +166,6 @@ class Observation:
         out[own] = change(out[own])
         return out
 
-    def estimated(self, count: int) -> list[tuple[NDArray[np.bool_], float]]:
-        """Rows (count,) whose noise is one level estimated from samples, with its freedom; empty where it is stated."""
-        if not self.force_freedom:
-            return []
-        rest = np.zeros(count - self.rows.count, dtype=bool)
-        if not self.force_own:
-            return [(np.r_[self.rows.force, rest], float(self.force_freedom))]
-        steps = np.unique(self.rows.step[self.rows.force])
-        return [(np.r_[self.rows.force & (self.rows.step == i), rest], self.force_own[i]) for i in steps]
-
     @cached_property
     def all_sections(self) -> Places:
         """Sections of all photos, one after the other."""

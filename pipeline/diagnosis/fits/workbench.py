@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.causes import SUSPECTS, Cause
 from pipeline.diagnosis.fits.extended import stiffness_change_linear
 from pipeline.diagnosis.fits.search import Suspicion, suspect
-from pipeline.diagnosis.statistics.score import null_maxima, threshold
+from pipeline.diagnosis.statistics.score import threshold
 from pipeline.faults import Faults
 from pipeline.messages import Message, ended
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -26,10 +26,6 @@ from rod.inverse.prediction import Facts, facts_of
 from rod.measurement import MeasuredTest
 
 Array = NDArray[np.float64]
-
-NULL_DRAWS = 20_000
-"""Draws of N(0, U^T U); the 1 % point is then known to 0.02 sigma."""
-
 
 SCATTER = 1e-5
 """Of a displacement under load, m: a dial gauge or a spindle is read to so much, where photos tell the travel of a step
@@ -69,8 +65,6 @@ class Workbench:
     suspicion : Suspicion
     in_law : Suspicion
         Forms of causes that the law takes over.
-    maxima : (draws,)
-        Sorted null distribution of the largest statistic.
     limit : float
         Family-wise threshold.
     """
@@ -81,7 +75,6 @@ class Workbench:
     base: Fit
     suspicion: Suspicion
     in_law: Suspicion
-    maxima: Array
     limit: float
 
     @property
@@ -140,18 +133,11 @@ def scored(
     causes: Sequence[Cause],
     settings: DiagnosisSettings,
 ) -> Workbench:
-    """Score all causes about a fitted model, with the null distribution and the threshold of these scores."""
+    """Score all causes about a fitted model, with the threshold of these scores."""
     fitted = replace(fitted, extension=replace(fitted.extension, facts=_with_bends(fitted)))
     suspicion, in_law = (suspect(observation, fitted, causes, of_law=of_law) for of_law in (False, True))
-    maxima = null_maxima(
-        suspicion.scores.unit,
-        suspicion.sign,
-        draws=NULL_DRAWS,
-        rng=np.random.default_rng(settings.seed),
-        estimated=observation.estimated(len(fitted.residual)),
-    )
-    limit = threshold(maxima, settings.false_alarm)
-    return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, in_law, maxima, limit)
+    limit = threshold(settings.false_alarm, suspicion.scores.visible)
+    return Workbench(test, fitted.extension.facts, observation, fitted, suspicion, in_law, limit)
 
 
 def _with_bends(fitted: Fit) -> Facts:

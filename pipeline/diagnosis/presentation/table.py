@@ -54,7 +54,7 @@ def table(
             CauseRow(
                 name=cause.name,
                 z=float(scores.z[loudest]),
-                p_adjusted=float(adjusted_p(suspicion.statistic, bench.maxima)[loudest]),
+                p_adjusted=adjusted_p(suspicion.statistic[loudest], bench.suspicion.scores.visible),
                 estimate=_finite(size.estimate),
                 std=size.std if size.std < UNKNOWN * cause.plausible(bench.facts) else 0.0,
                 unit=cause.unit,
