@@ -18,14 +18,13 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array
-from pipeline.vision.median import median, scatter
+from pipeline.vision.median import SURE_SIGMAS, median, scatter
 from pipeline.vision.photo import Closeup, straightened
 from pipeline.vision.polyline import step_lengths
 
 _PER_WIDTH = 10  # columns of the straightened picture a width, one a px at least
 _NULL = (1.15, 1.4, 1.65)  # widths from the midline where there is no edge; the window along a cable reaches to 2.25
-_SURE = 3.0  # standard deviations; a block's edge that noise passes for once in 700
-_FIRM = 4.0  # the same; of the median block of a strip that leaves no doubt
+_FIRM = 4.0  # standard deviations; of the median block of a strip that leaves no doubt
 _LEAST_LIKENESS = 0.45  # cables on webcam photos reach 0.6 and more; with paper on a third of a cable 0.4 is left
 _STEADY = 0.1  # of what camera and edges explain: a width as constant as that is as good as any
 _LEVEL = 1.0 / 512.0  # of full range; half a level of 8 bits: no photo is calmer than its rounding
@@ -95,7 +94,7 @@ class Evidence:
     @property
     def enough(self) -> bool:
         """True if more speaks for a cable than against it; how well it is known, its band says."""
-        return self.likeness >= _LEAST_LIKENESS and self.edges >= _SURE
+        return self.likeness >= _LEAST_LIKENESS and self.edges >= SURE_SIGMAS
 
 
 def weigh(
@@ -152,7 +151,7 @@ def weigh(
     edges = median(weaker)
     return Evidence(
         length=length,
-        seen=float(np.mean(weaker > (min(_SURE, 0.5 * edges) if known else _SURE))) * share,
+        seen=float(np.mean(weaker > (min(SURE_SIGMAS, 0.5 * edges) if known else SURE_SIGMAS))) * share,
         edges=edges,
         unsteady=_unsteady(widths, width, std, grid),
         crossed=crossed,

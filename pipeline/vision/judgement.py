@@ -21,7 +21,6 @@ from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.beyond import (
-    LEAST_MORE_WIDTHS,
     follow,
     followed_in,
     more_beyond,
@@ -38,7 +37,7 @@ from pipeline.vision.search.ends import (
     settle_end,
     without_specks,
 )
-from pipeline.vision.search.strips import Strip
+from pipeline.vision.search.strips import MIN_PIECE_WIDTHS, Strip
 
 _LEAST_SLENDERNESS = 10.0  # widths; a shorter strip of unknown width is a fold or a thing: no rod bends on ten
 _LEAST_BEFORE_COVER = 1.0  # widths; a shorter piece of cable between a band across it and a cover shows no direction
@@ -85,7 +84,7 @@ def judge_strip(
     if code not in ("photo/hidden-end", "photo/bearing"):
         return outcome
     cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
-    least = LEAST_MORE_WIDTHS if code == "photo/hidden-end" else _LEAST_BEFORE_COVER
+    least = MIN_PIECE_WIDTHS if code == "photo/hidden-end" else _LEAST_BEFORE_COVER
     path = follow(standout, cut, cut.usual_width, least=least)
     if path is None:
         return outcome
@@ -118,7 +117,7 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
         return refusal
     others = [other for other in reading.strips if other is not strip]
     # a screw or a jaw beyond an end is shorter than a piece; where a length is known, that tells of a short rest
-    least = _LEAST_REST if cable.any_length else LEAST_MORE_WIDTHS
+    least = _LEAST_REST if cable.any_length else MIN_PIECE_WIDTHS
     more = more_beyond(standout, cut, axes, others, length_px=cable.length_px, least=least)
     if more is not None and not cable.any_length:
         return refused_at(photo, "photo/hidden-end.goes-on", more)

@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+SURE_SIGMAS = 3.0
+"""Standard deviations that chance passes once in 400; what is less may be noise."""
+
 MAD_TO_STD = 1.4826
 """Standard deviation of a normal distribution by its median absolute deviation."""
 

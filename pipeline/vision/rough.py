@@ -17,6 +17,11 @@ from pipeline.vision.evidence import Evidence
 from pipeline.vision.photo import Closeup
 from pipeline.vision.polyline import step_lengths
 
+WIDTH_OFF = 0.15
+"""Relative; scales and diameters are known to some percent, and light moves both edges of a cable by less: what is
+farther off in width is another thing, such as a strip split off along a highlight, which is 30 % too narrow.
+"""
+
 AxisKind = Literal["cover", "given", "end", "clamp"]
 
 

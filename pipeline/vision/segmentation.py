@@ -26,9 +26,9 @@ from pipeline.vision.photo import Photo, levels
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.search.backdrop import Standout, choose_reduction, in_one_colour, stand_out
-from pipeline.vision.search.beyond import LEAST_MORE_WIDTHS
 from pipeline.vision.search.border import border_width
 from pipeline.vision.search.candidates import Reading, Wanted, read_photo
+from pipeline.vision.search.strips import MIN_PIECE_WIDTHS, WIDTH_RATIO_RANGE
 
 Window = tuple[int, int, int, int]
 
@@ -222,7 +222,7 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     for _, refusal, path in refusals:
         # other readings of a photo that shows a crossing, or the cable cut, may show one arm of it as a clean strip
         length, beyond = float(step_lengths(path).sum()), _length_beyond(path, best)
-        longer = length > best.length_px and beyond > 2.0 * LEAST_MORE_WIDTHS * best.half_width_px
+        longer = length > best.length_px and beyond > 2.0 * MIN_PIECE_WIDTHS * best.half_width_px
         if longer and refusal.code in ("photo/crossing", "photo/hidden-end"):
             return refusal
         if refusal.code == "photo/crossing" and _is_piece(best) and beyond < 0.5 * length:
@@ -263,7 +263,7 @@ def _is_piece(found: RoughCable) -> bool:
 
 def _is_rival(found: RoughCable, best: RoughCable) -> bool:
     """True for a strip of about the width of the best, elsewhere, that is as surely a cable and about as long."""
-    alike = 0.6 < found.half_width_px / best.half_width_px < 1.6
+    alike = WIDTH_RATIO_RANGE[0] < found.half_width_px / best.half_width_px < WIDTH_RATIO_RANGE[1]
     long = found.evidence.value > _RIVAL * best.evidence.value
     return alike and long and found.evidence.enough and not _lies_on(found, [best.path_px])
 

@@ -16,6 +16,7 @@ import numpy as np
 from pipeline.messages import Message
 from pipeline.records import Centerline, Finding, Rejected, Specimen, Traces
 from pipeline.settings.vision import VisionSettings
+from pipeline.vision.rough import WIDTH_OFF
 from pipeline.vision.single import trace_photo
 
 MISLED = frozenset({"photo/width", "photo/bearing", "photo/hidden-end", "photo/crossing", "photo/outline"})
@@ -26,9 +27,6 @@ LOOKED_AT = 3
 
 ALIKE = 0.05
 """Relative; widths on several photos of one cable agree to a percent, those of shadows and highlights do not."""
-
-OFF = 0.15
-"""Relative; diameters and scales are known to some percent, and light moves both edges of a cable by less."""
 
 LEAST_LENGTH, MOST_LENGTH = 0.7, 1.1
 """Visible length over the stated one: covers hide up to a diameter or three at each end, and photos have a scale."""
@@ -93,7 +91,7 @@ def _width_seen(specimen: Specimen, traces: Traces, settings: VisionSettings) ->
     alike = np.ptp(widths) < ALIKE * np.median(widths)
     whole = lengths.min() > LEAST_LENGTH and lengths.max() < MOST_LENGTH
     width = float(np.median(widths))
-    off = abs(width / specimen.diameter_m - 1.0) > OFF
+    off = abs(width / specimen.diameter_m - 1.0) > WIDTH_OFF
     return width if alike and whole and off else None
 
 

@@ -22,7 +22,7 @@ from scipy.special import ndtr
 
 from pipeline.records import Array
 from pipeline.vision.centerline.slow_light import steadied
-from pipeline.vision.median import MAD_TO_STD, median, medians, quantile
+from pipeline.vision.median import MAD_TO_STD, SURE_SIGMAS, median, medians, quantile
 
 Float32 = NDArray[np.float32]
 Real = TypeVar("Real", Array, Float32)
@@ -35,10 +35,6 @@ _PIXEL_OUTLIER = 4.0
 """
 _PLAIN_STEP = 0.1  # of the edge's step; differences up to it are texture or slow light, not letters
 _LEAST_PIXEL_SHARE = 0.5  # weight left on a section's pixels; with less there is something else than an edge
-_LEAST_STEP_SIGMAS = 3.0
-"""Standard deviations of an edge's step; a lesser one is none: on paper that hid 12 diameters, edges of noise along the
-search's straight bridge moved the midline by 30 px.
-"""
 _USUAL_RAMP = 0.07
 """Of the step in one blur; a ramp so steep must explain as much of the pixels as their scatter is, else it is taken for
 halo, grid and texture: of thin cables, whose few pixels do not tell them apart, free ramps moved the midline by a third
@@ -341,8 +337,9 @@ def fit_edges(
         if quantile(np.abs(shift), 0.98) < 1e-2:
             break
     covariance = (noise**2)[:, None, None] * np.linalg.inv(gram)
-    # What hides the cable has no edge, but noise has a step wherever it is sought, half of them upward.
-    faint = step < _LEAST_STEP_SIGMAS * np.sqrt(covariance[:, 1, 1])
+    # What hides the cable has no edge, but noise has a step wherever it is sought, half of them upward: on paper that
+    # hid 12 diameters, edges of noise along the search's straight bridge moved the midline by 30 px.
+    faint = step < SURE_SIGMAS * np.sqrt(covariance[:, 1, 1])
     found = np.where((weight.sum(axis=1) < _LEAST_PIXEL_SHARE * count) | faint, np.nan, place).reshape(shape)
     light, errors = np.stack([level, step], axis=1).reshape(*shape, 2), covariance.reshape(*shape, 3, 3)
     steady, std = steadied(found, light, errors, s)

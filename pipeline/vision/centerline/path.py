@@ -24,11 +24,10 @@ from pipeline.vision.centerline.midline import (
 )
 from pipeline.vision.median import median
 from pipeline.vision.polyline import arc_lengths
-from pipeline.vision.rough import RoughCable
+from pipeline.vision.rough import WIDTH_OFF, RoughCable
 from pipeline.vision.search.closeup import edge_spreads
 
 _BLOCK = 1.5  # half widths before what hides a cable up to a given axis: its border may lie aslant by 45 degrees or so
-_WIDTH_TOLERANCE = 0.15  # relative; prior of the width in the search when the diameter is known, else twice that
 _COVER_CHECK_RADII = 0.6
 """Of the radius; a section counts where it is free of covers that far out on both sides: inside the edges' windows."""
 _LEAST_SEEN_RADII = 10.0  # of the radius; a shorter seen piece is no measurement
@@ -108,7 +107,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width)
     if span is None:
         return _lost(rough, 0.0)
-    tolerance = _WIDTH_TOLERANCE * (1.0 if known else 2.0)
+    tolerance = WIDTH_OFF * (1.0 if known else 2.0)  # a mask's width is known half as well
     found = search_edges(closeup, path, span=span, half_width=half_width, tolerance=tolerance)
     width = found.edges[:, 1] - found.edges[:, 0]
     middle = median(width[found.usable]) if found.usable.any() else np.nan

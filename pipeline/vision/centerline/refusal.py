@@ -17,14 +17,10 @@ from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.evidence import Evidence, unlike_a_cable, weigh
 from pipeline.vision.median import median, scatter
-from pipeline.vision.rough import RoughCable
+from pipeline.vision.rough import WIDTH_OFF, RoughCable
 from pipeline.vision.scale.plane import ChordFrame
 from pipeline.vision.search.border import soft_beside_sharp
 
-_WIDTH_OFF = 0.15
-"""Relative; a strip split off along a highlight is 30 % too narrow, scales are known to some percent. More by the blur,
-which moves edges by a part of itself.
-"""
 _BESIDE_COVER = 0.5  # radii; flanks, shadows and stripes pass a cover's axis by 0.85 and more, a cable by a tenth
 _BESIDE_DOUBTED = 1.0  # radii; a cover that is not surely seen may lie elsewhere, but the cable runs over its axis
 _UNEVEN_PX, _UNEVEN = 0.8, 0.025  # px and widths; scatter of middles about a smooth curve: shades on white 0.04 widths
@@ -78,7 +74,8 @@ def _soft(rough: RoughCable, sections: Sections) -> Message | None:
 
 
 def _another_width(middle: float, diameter: float | None, blur: float) -> Message | None:
-    off = diameter is not None and abs(middle - diameter) > _WIDTH_OFF * diameter + blur
+    # blur moves edges by a part of itself
+    off = diameter is not None and abs(middle - diameter) > WIDTH_OFF * diameter + blur
     return Message("photo/width.traced") if off else None
 
 

@@ -19,12 +19,12 @@ from scipy.interpolate import CubicSpline
 from pipeline.messages import Message
 from pipeline.records import Array, Centerline, Finding, Scale, Specimen, inferred
 from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.vision.median import SURE_SIGMAS
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
 
 _LENGTH = Message("scale.length")
 _MAX_SCALE_STD = 0.01  # relative; a source of scale worse than that is no better than the cable's length
-_CHECK_SIGMAS = 3.0  # sigmas; one false finding in 400 checks
 _COVER_DIAMETER_STD = 0.004  # relative; 0.05 mm on 12 mm: how well a turned cover is known and its rim is lit
 _COVER_HEIGHT_M = 1e-3  # m; top of a cover or marker above the cable's upper side: a lid and its screw
 _CHECK_FLOOR = 0.005  # relative; smaller deviations change the stiffness by less than one percent
@@ -199,7 +199,7 @@ def check_scale(
             for witness in (travel, _by_length(calibration, found, specimen, settings))
             if witness is not None
             and witness.source != found_by.source
-            and abs(covers.px_per_m - 1.0) > _CHECK_SIGMAS * _std(witness, found_by)
+            and abs(covers.px_per_m - 1.0) > SURE_SIGMAS * _std(witness, found_by)
         ]
         confirmed = witnesses and not any(_off(witness, found_by) for witness in witnesses)
         if confirmed:
@@ -218,7 +218,7 @@ def _std(other: Scale, used: Scale) -> float:
 
 def _off(other: Scale, used: Scale) -> bool:
     """True if a scale in units of the one used differs from it by more than both allow."""
-    return abs(other.px_per_m - 1.0) > max(_CHECK_SIGMAS * _std(other, used), _CHECK_FLOOR)
+    return abs(other.px_per_m - 1.0) > max(SURE_SIGMAS * _std(other, used), _CHECK_FLOOR)
 
 
 def _away(other: Scale, used: Scale) -> Message:

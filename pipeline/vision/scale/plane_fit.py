@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 
 from pipeline.messages import Message
 from pipeline.records import Array
-from pipeline.vision.median import scatter
+from pipeline.vision.median import SURE_SIGMAS, scatter
 from pipeline.vision.scale.plane import Lens, PlaneMap, project
 
 USUAL_LENS = 0.02  # relative; standard deviation of k1 at half the diagonal among lenses nobody corrected
@@ -28,7 +28,6 @@ _LEAST_STD_PX = 1e-3  # px; of corners: a tenth of what noise leaves at best
 _LENS_PHOTOS = 3  # photos; so many positions tell a lens, two leave its focal lengths and middle open (Zhang, 2000)
 _DISTANCE_STD = 0.3  # relative; a distance known worse tells no more than a usual one
 _CORNER_STD_PX = 0.15  # px; corners of real boards off the plane, before they are fitted
-_LENS_SIGMAS = 3.0  # sigmas; a weaker k2 or tangential term adds more error than it removes
 _ONE_PLANE_RATIO = 1.5  # ratio of the corners' rms in one plane to that in free positions; tilts of a degree double it
 
 
@@ -237,9 +236,9 @@ def _fit_free_views(views: list[BoardView]) -> list[PlaneFit]:
         cv2.calibrateCameraExtended(objects, images, views[0].size, np.eye(3), np.zeros(5), flags=flags)
         for flags in (simple, cv2.CALIB_FIX_K3)
     ]
-    # k2 and the tangential terms run wild outside the board unless the corners really show them.
+    # k2 and the tangential terms run wild outside the board unless the corners surely show them.
     drop = (fits[0][0] ** 2 - fits[1][0] ** 2) / fits[1][0] ** 2 * 2 * sum(len(v.uv) for v in views)
-    rms, camera, distortion, turns, shifts, stds, *_ = fits[1] if drop > _LENS_SIGMAS**2 * 3 else fits[0]
+    rms, camera, distortion, turns, shifts, stds, *_ = fits[1] if drop > SURE_SIGMAS**2 * 3 else fits[0]
     lens = Lens(np.asarray(camera, np.float64), np.asarray(distortion, np.float64).ravel()[:5])
     focal, stds = float(lens.camera[0, 0]), np.ravel(stds)  # of fx, fy, cx, cy, k1
     middle, radius = _picture(views[0])

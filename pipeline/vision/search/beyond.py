@@ -19,14 +19,13 @@ from pipeline.records import Array
 from pipeline.vision.median import median
 from pipeline.vision.photo import straightened
 from pipeline.vision.polyline import step_lengths
-from pipeline.vision.rough import Bearing
+from pipeline.vision.rough import WIDTH_OFF, Bearing
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import MIN_PARTNER_WIDTHS, Reading
 from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import led_on, runs_of, straight_body
-from pipeline.vision.search.strips import THICK_WIDTHS, Strip, arc_joins, thick_part
+from pipeline.vision.search.strips import MIN_PIECE_WIDTHS, THICK_WIDTHS, Strip, arc_joins, thick_part
 
-LEAST_MORE_WIDTHS = 2.5  # widths; of the same strip beyond an end make it a piece: a clamp's screw or jaw is shorter
 _BEYOND_WIDTHS = 10.0  # widths; so far beyond a visible end more of the cable is looked for
 _BEYOND_LEADS_WIDTHS = ((1.5, 4.0), (1.5, 10.0), (6.0, 10.0))
 """Widths; pieces by which a path is led on, how far before its end they end and how long they are: a short one follows
@@ -40,7 +39,6 @@ out less may be shadows.
 _BEYOND_DARKEST = 0.02  # of full range; a ground darker than that is counted as so bright: it tells no share
 _SHEET_WIDTHS = 60.0  # widths; a sheet of paper across a cable hides no more of it: 300 mm of 5 mm
 _SHEET_TURN_DEG = 60.0  # degrees against the chord; a cable turns by twice that at most under a sheet
-_BEYOND_WIDTH_OFF = 0.15  # relative; a cable's width is constant within 5 %, where a line crosses it edges are lost
 _BEYOND_CONTRAST = (0.6, 1.6)
 """Of the strip's step by its ground's brightness; a shadow leaves it as it is, but stray light and the camera's curve
 do not; covers and clamps differ by more.
@@ -52,7 +50,7 @@ Axes = tuple[Bearing, Bearing]
 Place = tuple[float, float]
 
 
-def follow(standout: Standout, cut: CrossCut, width: float, *, least: float = LEAST_MORE_WIDTHS) -> Array | None:
+def follow(standout: Standout, cut: CrossCut, width: float, *, least: float = MIN_PIECE_WIDTHS) -> Array | None:
     """The path of a strip, led on beyond both ends for as long as there is more of the same, ``least`` widths long.
 
     None where it cannot be led on.
@@ -142,7 +140,7 @@ def _led_into_picture(standout: Standout, path: Array, width: float, lead: tuple
 def _alike(standout: Standout, cut: CrossCut, width: float, usual: float) -> NDArray[np.bool_]:
     low, high = _BEYOND_CONTRAST
     share = _weber(standout, cut, width) / usual
-    return (np.abs(cut.width / width - 1.0) < _BEYOND_WIDTH_OFF) & (share > low) & (share < high)
+    return (np.abs(cut.width / width - 1.0) < WIDTH_OFF) & (share > low) & (share < high)
 
 
 def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array
+from pipeline.vision.median import SURE_SIGMAS
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import CELLS_ACROSS, Image, Standout, averaged
 from pipeline.vision.search.crosscut import cut_across
@@ -35,7 +36,6 @@ from pipeline.vision.search.strips import (
 MIN_PARTNER_WIDTHS = 8.0  # widths; an end that meets a strip shorter than that meets a bolt or a letter
 _JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
 _LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next: texture may push it up or down
-_LOWEST_LEVEL = 3.0  # sigmas of the ground; the last level that is tried, below it noise makes strips
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
 _MAX_COVERED_SHARE = 0.5  # share of the photo; a mask that covers more is ground, not cable
 _MIN_BAND_EDGES = 0.5  # share of sections that show both edges of a cable within a band
@@ -118,7 +118,8 @@ def _levels(standout: Standout) -> list[float]:
     """Levels in ground sigmas, the likeliest first."""
     otsu, *higher = standout.levels
     others = (*higher, *(factor * otsu for factor in _LEVEL_FACTORS))
-    return [otsu, *(level for level in others if level > _LOWEST_LEVEL)]
+    # lower, noise makes strips
+    return [otsu, *(level for level in others if level > SURE_SIGMAS)]
 
 
 def _readings(picture: Image, level: float, wanted: Wanted) -> Iterator[Reading]:

@@ -24,8 +24,9 @@ from pipeline.vision.polyline import arc_lengths, step_lengths
 Mask = NDArray[np.uint8]
 
 THICK_WIDTHS = 1.7  # widths; wider things are objects: a soft shadow widens the mask by up to a half
-MIN_PIECE_WIDTHS = 2.5  # widths; shorter pieces are writing, dirt or texture
-WIDTH_RATIO_RANGE = (0.5, 1.7)  # to the diameter; mask widths of a cable with shadow or with a rim lost in glare
+MIN_PIECE_WIDTHS = 2.5  # widths; shorter pieces are writing, dirt or texture, beyond an end a clamp's screw or jaw
+WIDTH_RATIO_RANGE = (0.5, THICK_WIDTHS)
+"""To the diameter; mask widths of a cable with shadow or with a rim lost in glare, and of another that is as likely."""
 JOINT_ANGLE_DEG = 30.0  # degrees; over five widths a cable turns by less unless its bend radius is ten widths
 _LARGE_DISC = 31  # cells; an opening by a disc takes longer than two distance transforms from here on
 _CLOSING_WIDTHS = 0.45  # widths; gaps closed in the mask: a highlight takes up to a third of the width
