@@ -84,12 +84,7 @@ class Evidence:
     @property
     def clear(self) -> bool:
         """True if this is so surely a cable that no other reading of the photo need be looked at."""
-        return self.bordered and self.unsteady <= 1.0 and self.crossed is None
-
-    @property
-    def bordered(self) -> bool:
-        """True if both edges are surely seen nearly all along, whether they wave or not."""
-        return self.seen >= 0.9 and self.edges >= _FIRM
+        return self.seen >= 0.9 and self.edges >= _FIRM and self.unsteady <= 1.0 and self.crossed is None
 
     @property
     def enough(self) -> bool:

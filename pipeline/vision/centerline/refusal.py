@@ -23,7 +23,6 @@ from pipeline.vision.search.border import soft_beside_sharp
 
 _BESIDE_COVER = 0.5  # radii; flanks, shadows and stripes pass a cover's axis by 0.85 and more, a cable by a tenth
 _BESIDE_DOUBTED = 1.0  # radii; a cover that is not surely seen may lie elsewhere, but the cable runs over its axis
-_UNEVEN_PX, _UNEVEN = 0.8, 0.025  # px and widths; scatter of middles about a smooth curve: shades on white 0.04 widths
 _BEND = 0.5  # curvature times diameter; on a radius of two diameters a cable kinks, a curve led astray bends
 _AXIS_DISTANCE_RADII = 0.25
 """Of the radius; a centerline that misses a bearing axis by more is worth a warning: over 100 rendered rigs right ones
@@ -59,7 +58,6 @@ def refusal(
     figure = evidence.figures | ({} if diameter is None else {"width_over_diameter": whole / diameter})
     told = (
         (None if evidence.enough else unlike_a_cable(evidence))
-        or (None if evidence.bordered else _uneven(fit, sections, middle))
         or _soft(rough, sections)
         or _another_width(whole, diameter, scale * sections.softest)
         or _beside_cover(rough, fit, chord, middle)
@@ -77,14 +75,6 @@ def _another_width(middle: float, diameter: float | None, blur: float) -> Messag
     # blur moves edges by a part of itself
     off = diameter is not None and abs(middle - diameter) > WIDTH_OFF * diameter + blur
     return Message("photo/width.traced") if off else None
-
-
-def _uneven(fit: CurveFit, sections: Sections, middle: float) -> Message | None:
-    """Middles about no smooth curve where edges are not seen all along: shades, and no outline that waves."""
-    width = median(sections.width)
-    scatter = median(fit.point_std[fit.weight > 0.0]) * width / middle
-    limit = max(_UNEVEN_PX, _UNEVEN * width)
-    return None if scatter <= limit else Message("photo/outline.scatter", scatter_px=min(scatter, 99.0), limit_px=limit)
 
 
 def _beside_cover(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: float) -> Message | None:
