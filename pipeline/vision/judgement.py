@@ -25,7 +25,7 @@ from pipeline.vision.search.beyond import (
     followed_in,
     more_beyond,
 )
-from pipeline.vision.search.candidates import Reading, approaches_itself
+from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.closeup import edge_spreads, take_closeup
 from pipeline.vision.search.crosscut import CrossCut, crossed_at, cut_across, path_normals
 from pipeline.vision.search.ends import (
@@ -96,8 +96,6 @@ def judge_strip(
 
 def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable) -> RoughCable | Rejected:
     cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
-    if approaches_itself(strip.path, reading.width):
-        return refused_at(photo, "photo/crossing", standout.to_pixels(strip.path[len(strip.path) // 2]))
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
     crossed = crossed_at(standout, cut)
@@ -110,7 +108,7 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     if path is None:
         return refused(photo, "photo/bearing.nothing")
     cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
-    if not len(cut.seen_widths) or cut.usual_width < reading.finest:
+    if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
     refusal = _check_width(photo, cut, standout.reduction, cable)
     if refusal is not None:

@@ -13,11 +13,8 @@ from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from pipeline.records import Array
 from pipeline.vision.median import SURE_SIGMAS
-from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import CELLS_ACROSS, Image, Standout, averaged
 from pipeline.vision.search.crosscut import cut_across
 from pipeline.vision.search.strips import (
@@ -44,17 +41,13 @@ _BAND_WIDTHS = (2.2, 3.2)  # widths; cable and hard shadow together, by a lamp 4
 
 @dataclass(frozen=True)
 class Reading:
-    """Strips found in one mask, longest first; ``mask`` and ``thick`` are 0/1 pictures, ``level`` in ground sigmas.
-
-    What is narrower than ``finest`` the picture of which the mask was made does not show.
-    """
+    """Strips found in one mask, longest first; ``mask`` and ``thick`` are 0/1 pictures, ``level`` in ground sigmas."""
 
     strips: tuple[Strip, ...]
     mask: Mask
     thick: Mask
     width: float
     level: float
-    finest: float = 0.0
 
     @property
     def longest(self) -> float:
@@ -78,8 +71,8 @@ def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ..
     """
     nothing = np.zeros((1, 1), np.uint8)
     best, given = Reading((), nothing, nothing, wanted.width or 0.0, 0.0), 0
-    for picture, finest, level in _pictures(standout, wanted):
-        readings = [replace(reading, finest=finest) for reading in _readings(picture, level, wanted)]
+    for picture, level in _pictures(standout, wanted):
+        readings = list(_readings(picture, level, wanted))
         long = tuple(reading for reading in readings if reading.longest >= wanted.least_length)
         if long:
             given += 1
@@ -95,23 +88,15 @@ def read_photo(standout: Standout, wanted: Wanted) -> Iterator[tuple[Reading, ..
         yield (best,)
 
 
-def approaches_itself(path: Array, width: float) -> bool:
-    """True if the path comes back to within 1.2 widths of itself: the cable crosses or touches itself."""
-    s = arc_lengths(path)
-    first, second = cKDTree(path).query_pairs(1.2 * width, output_type="ndarray").T
-    return bool((np.abs(s[first] - s[second]) > 5.0 * width).any())
-
-
-def _pictures(standout: Standout, wanted: Wanted) -> Iterator[tuple[Image, float, float]]:
-    """What stands out, the width of the finest thing on that picture, and a level: the likeliest first.
+def _pictures(standout: Standout, wanted: Wanted) -> Iterator[tuple[Image, float]]:
+    """What stands out, and a level: the likeliest first.
 
     As it is, then its mean over a disc: the speckles of a ground average there, a cable does not, and no strip gets
     thick by the disc.
     """
-    yield from ((standout.distance, 0.0, level) for level in _levels(standout))
-    disc = round((THICK_WIDTHS - 1.0) * (wanted.width or CELLS_ACROSS)) | 1
-    calmer = averaged(standout, disc)
-    yield from ((calmer.distance, disc, level) for level in _levels(calmer))
+    yield from ((standout.distance, level) for level in _levels(standout))
+    calmer = averaged(standout, round((THICK_WIDTHS - 1.0) * (wanted.width or CELLS_ACROSS)) | 1)
+    yield from ((calmer.distance, level) for level in _levels(calmer))
 
 
 def _levels(standout: Standout) -> list[float]:
