@@ -91,9 +91,7 @@ def fit_curve(
     *,
     start: PlaneCurve,
     s: Array,
-    order: int,
     longest: float,
-    correlation_length: float | None = None,
 ) -> CurveFit:
     """Curve through points ``(n, 2)`` with relative errors ``std`` ``(n,)`` along the normal, by Gauss-Newton.
 
@@ -103,16 +101,12 @@ def fit_curve(
         First guess, as `initial_curve` gives; carries the knots.
     s : (n,)
         Guess of the points' arc lengths, ascending.
-    order : int
-        Order of the penalised derivative of the curvature, as in `make_frame`.
     longest : length
-        Bound of the correlation length: longer errors cannot be told from the curve.
-    correlation_length : length, optional
-        Of the errors; sought if not given.
+        Bound of the errors' correlation length: longer errors cannot be told from the curve.
     """
     curve, weight, moved = start, np.ones(len(points)), 0.0
     # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
-    length = median(np.diff(s)) if correlation_length is None else correlation_length
+    length = median(np.diff(s))
     for iteration in range(_ITERATIONS):
         s, residual = _step_to_foot(curve, points, s)
         spread = max(scatter(residual / std, 0.0), 1e-12)
@@ -120,8 +114,8 @@ def fit_curve(
             # A step leaves less than a tenth of its length: points as near as that may still be the curve's. A gap
             # among them starts the fit pixels off, and all beyond it would count as outliers.
             weight = _biweight(residual / std, max(spread, 0.1 * moved))
-        before, problem = curve, _linear(curve, s, residual, std, weight, order)
-        if iteration == 1 and correlation_length is None:
+        before, problem = curve, _linear(curve, s, residual, std, weight)
+        if iteration == 1:
             length = problem.correlation_length(longest)
         step = problem.estimate(length) - before.parameters
         curve = before.moved(step)
@@ -135,19 +129,19 @@ def fit_curve(
     return CurveFit(curve, smooth, points, std, s, residual, weight)
 
 
-def follow_points(points: Array, *, start: PlaneCurve, s: Array, order: int) -> PlaneCurve:
+def follow_points(points: Array, *, start: PlaneCurve, s: Array) -> PlaneCurve:
     """Smooth curve along most of the points ``(n, 2)``, of equal errors, for the next search: no covariance."""
     even, curve, apart = np.ones(len(points)), start, median(np.diff(s))
     weight = even
     for _ in range(2):
         s, residual = _step_to_foot(curve, points, s)
-        curve = curve.moved(_linear(curve, s, residual, even, weight, order).estimate(apart) - curve.parameters)
+        curve = curve.moved(_linear(curve, s, residual, even, weight).estimate(apart) - curve.parameters)
         _, left = _step_to_foot(curve, points, s)
         weight = _biweight(left, max(scatter(left, 0.0), 1e-12))
     return curve
 
 
-def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Array, order: int) -> Problem:
+def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Array) -> Problem:
     """Distances along the normal, linear in q; points without weight left out."""
     used = weight > 0.0
     normal = curve.normal_basis(s[used])
@@ -155,10 +149,10 @@ def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Ar
         design=normal,
         data=residual[used] + normal[:, 2:] @ curve.coefficients,
         penalty=curve.frame.penalty,
-        null=2 + order,
+        null=2 + curve.frame.order,
         std=std[used] / np.sqrt(weight[used]),
         position=s[used],
-        least=rms_of_bow(curve, order) ** 2 * float(np.ptp(curve.frame.knots)),
+        least=rms_of_bow(curve, curve.frame.order) ** 2 * float(np.ptp(curve.frame.knots)),
     )
 
 

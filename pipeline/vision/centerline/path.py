@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array, Rejected
-from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
+from pipeline.vision.centerline.curvature import Frame, PlaneCurve, make_frame
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
 from pipeline.vision.centerline.edges import (
     SEARCH_RADII,
@@ -40,10 +40,6 @@ _KNOT_SPACING_DIAMETERS = 1.5  # diameters; a cable cannot bend more sharply tha
 _MIN_INTERVALS = 16  # knot intervals; fewer bias kappa at mid-span above 0.05 %
 _PATH_KNOT_DIAMETERS = 5.0  # diameters; knots of the path that the edges are sought along
 _MOST_INTERVALS = 120  # knot intervals; bounds the time, and of more of them a gap among the points makes a bad start
-_PENALTY_ORDER = 3
-"""Derivative of kappa that is penalised: 3 leaves a parabola free, the bow's first shape; 2 was 30 % worse inside the
-span.
-"""
 _LONGEST_CORRELATION_DIAMETERS = 2.0
 """Diameters; bound of the errors' correlation length, longer ones cannot be told from a bend."""
 
@@ -67,16 +63,13 @@ def fit_along(
     length, diameter : float
         From axis to axis, and of the cable; one unit with the points.
     """
-    intervals = int(np.clip(length / (_KNOT_SPACING_DIAMETERS * diameter), _MIN_INTERVALS, _MOST_INTERVALS))
-    frame = make_frame(0.0, length, intervals=intervals, order=_PENALTY_ORDER)
-    return fit_curve(
-        points,
-        std,
-        start=initial_curve(points, s, frame),
-        s=s,
-        order=_PENALTY_ORDER,
-        longest=_LONGEST_CORRELATION_DIAMETERS * diameter,
-    )
+    start = initial_curve(points, s, _frame(length, _KNOT_SPACING_DIAMETERS * diameter))
+    return fit_curve(points, std, start=start, s=s, longest=_LONGEST_CORRELATION_DIAMETERS * diameter)
+
+
+def _frame(length: float, spacing: float) -> Frame:
+    intervals = int(np.clip(length / spacing, _MIN_INTERVALS, _MOST_INTERVALS))
+    return make_frame(length, intervals=intervals)
 
 
 def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | None = None) -> Sections | Rejected:
@@ -98,10 +91,8 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
         return _lost(rough, 0.0)  # too few points to start a curve from
     thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
     points, s = rough.path_px[first : last + 1 : thin], along[first : last + 1 : thin]
-    wanted = float(along[-1]) / (_PATH_KNOT_DIAMETERS * 2.0 * half_width)
-    intervals = int(np.clip(wanted, _MIN_INTERVALS, _MOST_INTERVALS))
-    frame = make_frame(0.0, float(along[-1]), intervals=intervals, order=_PENALTY_ORDER)
-    path = follow_points(points, start=initial_curve(points, s, frame), s=s, order=_PENALTY_ORDER)
+    frame = _frame(float(along[-1]), _PATH_KNOT_DIAMETERS * 2.0 * half_width)
+    path = follow_points(points, start=initial_curve(points, s, frame), s=s)
     covers = _covers(rough, blur or 0.0)
     margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in rough.axes]
     span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width)
@@ -117,7 +108,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     diameter, half_width = 2.0 * half_width, 0.5 * middle
     where, angle = path.at(found.s)
     edges = where[:, None] + found.edges[..., None] * normals(angle)[:, None]
-    path = follow_points(edges.mean(axis=1)[usable], start=path, s=found.s[usable], order=_PENALTY_ORDER)
+    path = follow_points(edges.mean(axis=1)[usable], start=path, s=found.s[usable])
     where, angle = path.at(found.s)
     if blur is None:
         blur = median(edge_spreads(rough.grey, where - closeup.origin_px, normals(angle), middle))

@@ -20,7 +20,6 @@ from pipeline.vision.search.crosscut import cut_across
 from pipeline.vision.search.strips import (
     MIN_PIECE_WIDTHS,
     THICK_WIDTHS,
-    WIDTH_RATIO_RANGE,
     Mask,
     Strip,
     find_strips,
@@ -174,7 +173,7 @@ def _strips_in_bands(standout: Standout, mask: Mask, thick: Mask, width: float, 
     most : widths
         Of the widest band.
     """
-    bands = find_strips(mask, thick, width, ratios=(WIDTH_RATIO_RANGE[0], most))
+    bands = find_strips(mask, thick, width, most=most)
     strips = [_cable_within(standout, band, width, 0.5 * (most - 1.0)) for band in bands]
     return sorted((strip for strip in strips if strip is not None), key=lambda strip: -strip.length)
 

@@ -84,8 +84,8 @@ def thick_part(mask: Mask, least: float) -> Mask:
     return np.asarray(away <= radius, np.uint8)
 
 
-def find_strips(mask: Mask, thick: Mask, width: float, *, ratios: tuple[float, float] | None = None) -> list[Strip]:
-    """Strips of about the given width (cells), longest first; ``ratios`` are their least and greatest width to it."""
+def find_strips(mask: Mask, thick: Mask, width: float, *, most: float = THICK_WIDTHS) -> list[Strip]:
+    """Strips of about the given width (cells), longest first, ``most`` widths wide."""
     grown = _morphology(thick, cv2.MORPH_DILATE, _disc(3.0))
     thin = mask & (1 - grown)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
@@ -95,11 +95,9 @@ def find_strips(mask: Mask, thick: Mask, width: float, *, ratios: tuple[float, f
     for label in largest[areas[largest - 1] >= MIN_PIECE_WIDTHS * width**2]:
         u, v, w, h = stats[label, :4]
         piece = np.pad((labels[v : v + h, u : u + w] == label).astype(np.uint8), 1)
-        strip = _trace(piece, width)
-        if strip is not None:
-            low, high = WIDTH_RATIO_RANGE if ratios is None else ratios
-            if low * width <= strip.width <= high * width:
-                strips.append(replace(strip, path=strip.path + np.array([u - 1, v - 1])))
+        strip = _trace(piece)
+        if strip is not None and WIDTH_RATIO_RANGE[0] * width <= strip.width <= most * width:
+            strips.append(replace(strip, path=strip.path + np.array([u - 1, v - 1])))
     return sorted(strips, key=lambda strip: -strip.length)
 
 
@@ -178,7 +176,7 @@ def end_direction(path: Array, width: float) -> Array:
     return np.asarray(chord / (np.hypot(*chord) + 1e-12))
 
 
-def _trace(piece: Mask, width: float) -> Strip | None:
+def _trace(piece: Mask) -> Strip | None:
     """Skeleton of one connected piece -> its longest shortest path."""
     skeleton = skeletonize(piece.astype(bool))
     vu = np.argwhere(skeleton)

@@ -16,7 +16,7 @@ LENGTH = 0.2
 
 def curve_of(kappa, *, intervals=24, angle=0.3, length=LENGTH):
     """Curve whose spline is the least-squares fit of kappa(s) on the grid."""
-    frame = make_frame(0.0, length, intervals=intervals, order=3)
+    frame = make_frame(length, intervals=intervals)
     coefficients = np.linalg.lstsq(frame.values, kappa(frame.grid), rcond=None)[0]
     return PlaneCurve(frame, coefficients, np.array([0.01, 0.02]), angle)
 
@@ -39,9 +39,9 @@ def noisy(kappa, rng, *, std, correlation, count=240, hidden=0.006, length=LENGT
 
 
 def fit(s, points, *, intervals=26, order=3, length=LENGTH, std=1e-5) -> CurveFit:
-    frame = make_frame(0.0, length, intervals=intervals, order=order)
+    frame = make_frame(length, intervals=intervals, order=order)
     start, stds = initial_curve(points, s, frame), np.full(len(s), std)
-    return fit_curve(points, stds, start=start, s=s, order=order, longest=0.01)
+    return fit_curve(points, stds, start=start, s=s, longest=0.01)
 
 
 def bow(s):
@@ -158,12 +158,10 @@ def test_white_noise_bands_are_too_narrow_for_correlated_errors():
     covered = {"white": [], "estimated": []}
     for _ in range(15):
         s, points = noisy(bow, rng, std=3e-6, correlation=0.004)
-        frame = make_frame(0.0, LENGTH, intervals=26, order=3)
+        frame = make_frame(LENGTH, intervals=26)
         start = initial_curve(points, s, frame)
-        for name, known in (("white", 1e-6), ("estimated", None)):
-            found = fit_curve(
-                points, np.full(len(s), 1e-5), start=start, s=s, order=3, longest=0.01, correlation_length=known
-            )
+        for name, longest in (("white", 0.0), ("estimated", 0.01)):
+            found = fit_curve(points, np.full(len(s), 1e-5), start=start, s=s, longest=longest)
             std = np.linalg.norm(found.curve.bases(at)[2] @ found.smooth.root, axis=1)
             covered[name].append(np.mean(np.abs(found.curve.curvature(at) - bow(at)) < 1.96 * std))
     assert np.mean(covered["estimated"]) > 0.9  # the target
@@ -206,12 +204,12 @@ def test_fewer_points_than_parameters_are_followed():
     """A short piece of cable between covers: the penalty tells what its points leave open."""
     turn = np.linspace(0.1, 0.9, 14)
     points = 0.2 * np.column_stack([np.sin(turn), 1.0 - np.cos(turn)])
-    frame = make_frame(0.0, LENGTH, intervals=16, order=3)
+    frame = make_frame(LENGTH, intervals=16)
     assert frame.size > len(points)
     s = 0.2 * turn
     path = initial_curve(points, s, frame)
     for _ in range(3):
-        path = follow_points(points, start=path, s=s, order=3)
+        path = follow_points(points, start=path, s=s)
     # three steps from a start that is the circle but for its chords, 1e-3 of the curvature: each squares what is off
     assert_allclose(path.at(path.foot(points, s))[0], points, atol=1e-8 * LENGTH)
     assert_allclose(path.curvature(s), 5.0, rtol=1e-4)
@@ -219,4 +217,4 @@ def test_fewer_points_than_parameters_are_followed():
 
 def test_frames_refuse_nonsense():
     with pytest.raises(ValueError, match="at least 4 intervals"):
-        make_frame(0.0, 1.0, intervals=3, order=3)
+        make_frame(1.0, intervals=3)

@@ -114,7 +114,7 @@ def test_noise_has_no_edge():
 
 
 def straight(length=400.0, v=60.0) -> PlaneCurve:
-    frame = make_frame(0.0, length, intervals=16, order=3)
+    frame = make_frame(length, intervals=16)
     return PlaneCurve(frame, np.zeros(frame.size - 2), np.array([frame.grid[frame.anchor] + 20.0, v]), 0.0)
 
 
