@@ -169,18 +169,12 @@ class PlaneCurve:
         """Derivatives ``(n, J + 2)`` of normal displacement, angle and curvature at ``s`` with respect to q."""
         frame = self.frame
         inside = np.clip(s, frame.knots[0], frame.knots[-1])
-        spline = BSpline(frame.knots, np.eye(frame.size - 2), DEGREE).antiderivative()
-        turn = spline(inside) - spline(frame.grid[frame.anchor])
+        splines = BSpline(frame.knots, np.eye(frame.size - 2), DEGREE)
+        whole = splines.antiderivative()
+        turn = whole(inside) - whole(frame.grid[frame.anchor])
         zero, one = np.zeros((len(inside), 1)), np.ones((len(inside), 1))
-        return self.normal_basis(s), np.column_stack([zero, one, turn]), self.curvature_basis(s)
-
-    def curvature_basis(self, s: Array) -> Array:
-        """Derivatives ``(n, J + 2)`` of the curvature at ``s`` with respect to q."""
-        frame = self.frame
-        inside = np.clip(s, frame.knots[0], frame.knots[-1])
-        basis = np.zeros((len(inside), frame.size))
-        basis[:, 2:] = BSpline(frame.knots, np.eye(frame.size - 2), DEGREE)(inside)
-        return basis
+        bend = np.column_stack([zero, zero, splines(inside)])
+        return self.normal_basis(s), np.column_stack([zero, one, turn]), bend
 
     def normal_basis(self, s: Array) -> Array:
         """Derivatives ``(n, J + 2)`` of the displacement along the normal at ``s`` with respect to q."""

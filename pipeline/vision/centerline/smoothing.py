@@ -45,8 +45,6 @@ class Smooth:
         Derivative of the estimate with respect to the data.
     sigma : float
         Scale of the given standard deviations; 1 if they were right.
-    freedom : float
-        Effective number of parameters.
     correlation_length : float
         In the unit of the positions.
     """
@@ -55,7 +53,6 @@ class Smooth:
     root: Array
     gain: Array
     sigma: float
-    freedom: float
     correlation_length: float
 
     @property
@@ -253,7 +250,6 @@ class Problem:
             root=diagonal.back @ (vectors * np.sqrt(np.maximum(values, 0.0))),
             gain=_unwhiten(white, self.std, self.gaps, correlation_length),
             sigma=float(np.sqrt(odds @ sigma2)),
-            freedom=float((odds @ (diagonal.gamma2 / share)).sum()),
             correlation_length=correlation_length,
         )
 

@@ -72,7 +72,7 @@ def _errors(case, *, marked=True, beside=0.0, apart=0.0, known=True, told=None):
         seen = _seen(case, beside, apart, marked=marked)
         fit, covariance = continue_to_axes(*seen, width=DIAMETER, told=told)
     ends = np.array([0.0, LENGTH])
-    basis = fit.curve.curvature_basis(ends)
+    basis = fit.curve.bases(ends)[2]
     std = np.sqrt(((basis @ covariance) * basis).sum(axis=1))
     return -fit.curve.curvature(ends) - curve.kappa[[0, -1]], std  # curve.kappa is positive in the bow's direction
 
