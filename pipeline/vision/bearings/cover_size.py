@@ -31,12 +31,11 @@ _COVER_RADII_WIDTHS = (0.62, 3.2)
 """Widths of the cable; range of radii searched where no size is given: covers of 1.4 to 6 diameters, and the mask may
 be a tenth wider or narrower than the cable; a smaller one shows too little of its rim.
 """
-_ON_RIM = 1.4  # radii from where a cable is lost to the centre of its cover: led straight on by a width at most
+_LOST_CABLE_REACH = 3.1  # radii from where a cable is lost to the centre of its cover: as far as that is searched
 _LOST_BEFORE_RIM = 1.9
-"""The same at one end, where others lie farther; letters up to the rim hide 0.9 of it, a dot of half the cover's size
-lies two of its own radii ahead.
+"""Radii; the same at one end at least: letters up to the rim hide 0.9 of it, a dot of half the cover's size lies two of
+its own radii ahead.
 """
-_LOST_CABLE_REACH = 3.1  # radii; at the others: as far as it is searched
 
 
 class _LostEnd(NamedTuple):
@@ -45,9 +44,9 @@ class _LostEnd(NamedTuple):
     place: Array
     circles: list[Circle]
 
-    def as_large(self, radius: float, most: float) -> Circle | None:
-        """The circle most nearly of some radius, ``most`` radii from the end; None if there is none about as large."""
-        near = [circle for circle in self.circles if self.ahead(circle) <= most]
+    def as_large(self, radius: float) -> Circle | None:
+        """The circle most nearly of some radius; None if there is none about as large near enough."""
+        near = [circle for circle in self.circles if self.ahead(circle) <= _LOST_CABLE_REACH]
         found = min(near, key=lambda circle: abs(circle.radius - radius), default=None)
         return None if found is None or abs(found.radius - radius) > SAME_RADIUS * radius else found
 
@@ -74,12 +73,11 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]]) -> float | None:
         for photo, cable in seen
         for end in visible_ends(cable)
     ]
-    for most, nearest in ((_ON_RIM, _ON_RIM), (_LOST_CABLE_REACH, _LOST_BEFORE_RIM)):
-        for first in sorted(ends[0].circles if ends else [], key=lambda circle: -circle.radius):
-            alike = [(end, end.as_large(first.radius, most)) for end in ends]
-            found = [(end.ahead(circle), circle.radius) for end, circle in alike if circle is not None]
-            if len(found) == len(ends) and min(found)[0] <= nearest:
-                return median([radius for _, radius in found])
+    for first in sorted(ends[0].circles if ends else [], key=lambda circle: -circle.radius):
+        alike = [(end, end.as_large(first.radius)) for end in ends]
+        found = [(end.ahead(circle), circle.radius) for end, circle in alike if circle is not None]
+        if len(found) == len(ends) and min(found)[0] <= _LOST_BEFORE_RIM:
+            return median([radius for _, radius in found])
     return None
 
 

@@ -36,7 +36,7 @@ _STIFF = 0.01  # of the squared step, added to every colour's variance: colours 
 _CORE = 0.45  # of the depth around; cells of a mask nearer to its rim than that are mixed with the ground
 _AROUND = np.ones((9, 9), np.uint8)  # cells
 _SHADE_COSINE, _DARKEST_SHADE = 0.97, 0.5  # of the ground's colour; a lamp leaves half of the light in a shadow
-_ROWS = 256  # px; worked on at a time: large photos shall not be held as single precision
+ROWS = 128  # px; worked on at a time: large photos shall not be held as single precision
 _LEAST_CABLE = 0.25  # of what stands out; with less, its colours are those of shadow or of other things
 _COLOUR_GRID_PX = 2.0  # px; of a Bayer filter, and of JPEG with 4:2:0
 
@@ -210,6 +210,6 @@ def _along(photo: Photo, core: Array, ground: Array) -> Photo:
     darkest = float(np.minimum(weights, 0.0).sum())
     scaled = (65535.0 / photo.full_scale * weights).astype(np.float32)[None]
     grey = np.empty(photo.pixels.shape[:2], np.uint16)
-    for rows in (slice(first, first + _ROWS) for first in range(0, len(grey), _ROWS)):
+    for rows in (slice(first, first + ROWS) for first in range(0, len(grey), ROWS)):
         grey[rows] = np.rint(cv2.transform(photo.pixels[rows].astype(np.float32), scaled) - 65535.0 * darkest)
     return Photo(photo.name, grey, 16, _COLOUR_GRID_PX, photo)

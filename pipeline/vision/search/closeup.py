@@ -13,10 +13,9 @@ import numpy as np
 from pipeline.records import Array
 from pipeline.vision.median import medians
 from pipeline.vision.photo import Photo, straightened
-from pipeline.vision.search.backdrop import Image, Standout
+from pipeline.vision.search.backdrop import ROWS, Image, Standout
 
 _GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
-_ROWS = 128  # px; of the window, projected at a time from the first to the last column that the corridor has there
 _CORRIDOR_WIDTHS = 2.25  # widths; half corridor kept at full resolution: noise is read up to 1.6 widths away
 
 
@@ -28,11 +27,11 @@ def take_closeup(photo: Photo, path_px: Array, width_px: float, weights: Array) 
     grey = np.zeros((high[1] - low[1], high[0] - low[0]), np.float32)
     scaled = (np.asarray(weights) / photo.full_scale).astype(np.float32)
     window = photo.pixels[low[1] : high[1], low[0] : high[0]]
-    for top in range(0, len(grey), _ROWS):
-        near = path_px[np.abs(path_px[:, 1] - low[1] - top - 0.5 * _ROWS) <= 0.5 * _ROWS + margin, 0] - low[0]
+    for top in range(0, len(grey), ROWS):
+        near = path_px[np.abs(path_px[:, 1] - low[1] - top - 0.5 * ROWS) <= 0.5 * ROWS + margin, 0] - low[0]
         if not len(near):
             continue
-        rows = slice(top, top + _ROWS)
+        rows = slice(top, top + ROWS)
         columns = slice(max(0, int(near.min() - margin)), int(near.max() + margin) + 1)
         part = window[rows, columns]
         if part.ndim == 2:
