@@ -35,7 +35,7 @@ _LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next:
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
 _MAX_COVERED_SHARE = 0.5  # share of the photo; a mask that covers more is ground, not cable
 _MIN_BAND_EDGES = 0.5  # share of sections that show both edges of a cable within a band
-_BAND_WIDTHS = (2.2, 3.2)  # widths; cable and hard shadow together, by a lamp 45 and 25 degrees above the table
+_BAND_WIDTHS = 3.2  # widths; cable and hard shadow together, by a lamp 25 degrees above the table
 
 
 @dataclass(frozen=True)
@@ -125,14 +125,13 @@ def _banded(standout: Standout, wanted: Wanted, width: float) -> Iterator[Readin
     """Readings with the cable as part of a wider band: a hard shadow has widened it."""
     for level in _levels(standout):
         mask = strip_mask(standout.distance > level, width)
-        if mask.mean() > _MAX_COVERED_SHARE:
-            continue
-        for most in _BAND_WIDTHS:
-            thick = thick_part(mask, most * width)
-            strips = _strips_in_bands(standout, mask, thick, width, most)
-            strips = [strip for strip in strips if wanted.least_length <= strip.length <= wanted.most_length]
-            if strips:
-                yield Reading(tuple(strips), mask, thick, width, level)
+        thick = thick_part(mask, _BAND_WIDTHS * width)
+        bands = find_strips(mask, thick, width, most=_BAND_WIDTHS)
+        within = [strip for strip in (_cable_within(standout, band, width) for band in bands) if strip is not None]
+        strips = [strip for strip in within if wanted.least_length <= strip.length <= wanted.most_length]
+        if strips:
+            strips.sort(key=lambda strip: -strip.length)
+            yield Reading(tuple(strips), mask, thick, width, level)
 
 
 def _read(above: NDArray[np.bool_], width: float, level: float, wanted: Wanted) -> Reading:
@@ -158,34 +157,14 @@ def _guess_widths(above: NDArray[np.bool_]) -> list[tuple[float, float]]:
     return sorted(widths + new, key=lambda guess: -guess[0] * guess[1])
 
 
-def _strips_in_bands(standout: Standout, mask: Mask, thick: Mask, width: float, most: float) -> list[Strip]:
-    """Strips of the cable's width within the bands of a mask, longest first.
-
-    Parameters
-    ----------
-    standout : Standout
-        What the mask was made of.
-    mask : (h, w)
-    thick : (h, w)
-        What is wider than any band.
-    width : cells
-        The cable's.
-    most : widths
-        Of the widest band.
-    """
-    bands = find_strips(mask, thick, width, most=most)
-    strips = [_cable_within(standout, band, width, 0.5 * (most - 1.0)) for band in bands]
-    return sorted((strip for strip in strips if strip is not None), key=lambda strip: -strip.length)
-
-
-def _cable_within(standout: Standout, band: Strip, width: float, search: float) -> Strip | None:
+def _cable_within(standout: Standout, band: Strip, width: float) -> Strip | None:
     """The cable's strip in a band; None where most sections show no pair of edges."""
     # a skeleton runs into a corner of the band over its last half width
     corner = round(0.5 * band.width)
     path = band.path[corner : len(band.path) - corner]
     if len(path) < MIN_PIECE_WIDTHS * width:
         return None
-    cut = cut_across(standout, path, width, known=True, search=search)
+    cut = cut_across(standout, path, width, known=True, search=0.5 * (_BAND_WIDTHS - 1.0))
     if len(cut.seen_widths) < _MIN_BAND_EDGES * len(cut.width):
         return None
     return replace(band, path=cut.path, width=cut.usual_width)
