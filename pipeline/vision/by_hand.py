@@ -21,7 +21,7 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
-from pipeline.vision.search.strips import Strip
+from pipeline.vision.search.strips import Strip, drawn_path
 
 _WIDTHS = np.geomspace(4.0, 80.0, 10)
 """Px; tried along clicks where the diameter is unknown: an edge is sought as far as a third beside its place."""
@@ -78,6 +78,5 @@ def reading_along(standout: Standout, path_px: tuple[tuple[float, float], ...], 
     keep = np.r_[True, np.diff(s) > 0.0]
     path = CubicSpline(s[keep], clicks[keep])(np.linspace(0.0, s[-1], max(3, round(s[-1]) + 1)))
     width = width_px / standout.reduction
-    mask = np.zeros(standout.residual.shape[:2], np.uint8)
-    cv2.polylines(mask, [np.rint(path).astype(np.int32)], False, 1, max(1, round(width)))
+    mask = drawn_path(path, width, standout.residual.shape)
     return Reading((Strip(path, width),), mask, np.zeros_like(mask), width, 0.0)

@@ -89,7 +89,7 @@ def judge_strip(
     if path is None:
         return outcome
     whole = replace(strip, path=path)
-    masks = followed_in(standout, cut, reading, strip, whole)
+    masks = followed_in(standout, cut, reading, whole)
     followed = _judge(photo, standout, masks, whole, cable)
     return outcome if isinstance(followed, Rejected) else followed
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -24,7 +23,7 @@ from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import MIN_PARTNER_WIDTHS, Reading
 from pipeline.vision.search.crosscut import SEEN_SHARE, CrossCut, cut_across, path_normals
 from pipeline.vision.search.ends import led_on, runs_of, straight_body
-from pipeline.vision.search.strips import MIN_PIECE_WIDTHS, THICK_WIDTHS, Strip, arc_joins, thick_part
+from pipeline.vision.search.strips import MIN_PIECE_WIDTHS, THICK_WIDTHS, Strip, arc_joins, drawn_path, thick_part
 
 _BEYOND_WIDTHS = 10.0  # widths; so far beyond a visible end more of the cable is looked for
 _BEYOND_LEADS_WIDTHS = ((1.5, 4.0), (1.5, 10.0), (6.0, 10.0))
@@ -66,29 +65,20 @@ def follow(standout: Standout, cut: CrossCut, width: float, *, least: float = MI
     return path if len(path) > len(cut.path) else None
 
 
-def followed_in(standout: Standout, cut: CrossCut, reading: Reading, piece: Strip, whole: Strip) -> Reading:
-    """A reading with the ``whole`` in place of the ``piece``, whose cross-cuts are ``cut``, and of other pieces of it.
+def followed_in(standout: Standout, cut: CrossCut, reading: Reading, whole: Strip) -> Reading:
+    """A reading with the ``whole`` in place of the piece of it whose cross-cuts are ``cut``, and of other pieces.
 
-    What hid the rest, such as a shadow, is taken out of the masks around it, but for things that stand out like the
-    cable itself: a clamp at its end.
+    What hid the rest, such as a shadow, is no part of its masks: only what stands out like the cable itself, a clamp at
+    its end.
     """
     width = reading.width
     tree = cKDTree(whole.path)
     others = [strip for strip in reading.strips if median(tree.query(strip.path)[0]) > 0.5 * width]
-    added = whole.path[cKDTree(piece.path).query(whole.path)[0] > width]
-    drawn, around = np.zeros_like(reading.mask), np.zeros_like(reading.mask)
-    cv2.polylines(drawn, [np.rint(whole.path).astype(np.int32)], False, 1, max(1, round(width)))
-    for point in np.rint(added[:: max(1, round(0.5 * width))]).astype(int).tolist():
-        cv2.circle(around, point, round(2.5 * width), 1, cv2.FILLED)
     relief = (standout.residual @ cut.weights.astype(np.float32)) * (-1.0 if cut.dark else 1.0)
     strong = (relief > _BEYOND_OBJECT_CONTRAST * cut.contrast).astype(np.uint8)
     thick = reading.thick & thick_part(strong, THICK_WIDTHS * width)
-    return replace(
-        reading,
-        strips=(whole, *others),
-        mask=np.where(around, drawn | thick, reading.mask),
-        thick=np.where(around, thick, reading.thick),
-    )
+    mask = drawn_path(whole.path, width, reading.mask.shape) | thick
+    return replace(reading, strips=(whole, *others), mask=mask, thick=thick)
 
 
 def _ahead(standout: Standout, cut: CrossCut, path: Array, width: float, least: float) -> Array | None:

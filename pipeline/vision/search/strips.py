@@ -70,6 +70,13 @@ def strip_mask(above: NDArray[np.bool_], width: float) -> Mask:
     return _morphology(mask, cv2.MORPH_OPEN, _disc(_OPENING_WIDTHS * width))
 
 
+def drawn_path(path: Array, width: float, shape: tuple[int, ...]) -> Mask:
+    """Mask of a picture of some shape with a strip so wide along a path, and nothing else."""
+    mask = np.zeros(shape[:2], np.uint8)
+    cv2.polylines(mask, [np.rint(path).astype(np.int32)], False, 1, max(1, round(width)))
+    return mask
+
+
 def thick_part(mask: Mask, least: float) -> Mask:
     """Things at least so many cells wide: clamps, covers, the holder."""
     disc = _disc(least)
