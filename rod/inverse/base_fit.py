@@ -7,6 +7,7 @@ brings something (`settled`); the photos' noise by what is faster along the cabl
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -41,6 +42,7 @@ def base_fit(
     begin: tuple[float, float] | None = None,
     elements: int = ELEMENTS,
     functions: int = SHAPE_FUNCTIONS,
+    beside: Callable[[Observation, Fit], Fit] = lambda _, fitted: fitted,
     calibrated: bool = True,
     without_photos: frozenset[int] = frozenset(),
     without_forces: frozenset[int] = frozenset(),
@@ -58,6 +60,9 @@ def base_fit(
         Of the simulated cable.
     functions : int
         Of the shapes that a photo is compared by.
+    beside : callable
+        A fit with errors besides that data have: valleys of K0 are compared with these. Displacements that are taken
+        for exact, and scatter by 50 um, choose one by chance.
     calibrated : bool
         Whether photos are as noisy as they show, or as they say.
     without_photos, without_forces : sets of int
@@ -81,7 +86,7 @@ def base_fit(
         for side in (bent, -bent):
             one = settled(observation, _first(observation, begun(side), facts))
             valleys += [one] if one.run.prediction is not None and all(_apart(one, two) for two in valleys) else []
-    fitted = min(valleys, key=_cost)
+    fitted = valleys[0] if len(valleys) == 1 else min(valleys, key=lambda one: _cost(beside(observation, one)))
     if fitted.run.prediction is None or not observation.photos:
         return BaseFit(observation, fitted)
     if calibrated:
@@ -170,7 +175,6 @@ def held_to(observation: Observation, fitted: Fit, scatter: float, rig: tuple[fl
     """A model with displacements under load held to ``scatter`` (m) beyond what the log tells of them.
 
     What a ``rig`` is off by (`rod.inverse.base.RIG`) is unknown and of that size from now on, where it is given.
-    Valleys of K0 are compared before: beside errors of displacements of its own each fits nearly as well.
     """
     extension, facts = fitted.extension, fitted.extension.facts
     base, pushed, std = extension.base, list(facts.pushed), facts.displacement_std.copy()

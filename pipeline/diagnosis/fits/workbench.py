@@ -117,6 +117,7 @@ def prepare(
     observation, fitted = base_fit(
         test,
         facts_of(test),
+        beside=beside_errors,
         without_photos=faults.photos,
         without_forces=faults.forces,
     )

@@ -5,7 +5,7 @@ import pytest
 
 from fixtures.continuum import Cable
 from fixtures.effects import LARGEST
-from fixtures.hidden import SIX, THREE, Reading, hidden_test
+from fixtures.hidden import SIX, THREE, Protocol, Reading, hidden_test
 from fixtures.laws.measured import Trial as LawTrial
 from fixtures.photographed.specimen import Order, make, write
 from fixtures.photographed.trial import answer
@@ -98,6 +98,19 @@ def test_three_photos_without_a_force_free_one_leave_the_false_valley_of_pre_cur
     # with K0 at -0.7 1/m for 0.86 and a law that rises from rest: 22.6 % off, 77 % of it in the band
     assert found["f_error"] < 0.03
     assert found["f_covered"] > 0.9
+
+
+@pytest.mark.parametrize("K0", [0.7, 1.0])
+def test_displacements_that_scatter_do_not_choose_the_side_to_which_the_cable_is_bent(K0):
+    """Without a photo at rest a cable bent to the other side shows the same: taken for exact, the log decides."""
+    four = Protocol((0.25, 0.5, 0.75, 1.0), ("loading",) * 4)
+    cable, rng = Cable(K0=K0, EI0=0.0045, EI1=0.0055), np.random.default_rng(4)
+    test = hidden_test(cable, four, largest=LARGEST, seed=4, reading=Reading(section_px=0.2))
+    steps = [replace(step, displacement=step.displacement + rng.normal(0.0, 5e-5)) for step in test.steps]
+    bench = workbench.prepare(faults_of_input(replace(test, steps=tuple(steps))), SETTINGS)
+    base = bench.base.extension.base
+    std = np.sqrt(bench.base.covariance[base.pre_curvature_index, base.pre_curvature_index])
+    assert abs(base.pre_curvature(bench.base.vector) - K0) < 3.0 * std < 0.5
 
 
 def test_errors_of_the_bearing_axes_are_no_pattern_of_what_is_left():
