@@ -8,7 +8,7 @@ A fit whitens its rows by the noise that is likeliest beforehand. What is known 
               as far as few samples leave the level of their noise open
     moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
     rig       zeros of displacement and force, length and lean of the camera exact, as rigs have them, or worse;
-              beside something else always as rigs have them, and that holds what displacements scatter
+              beside something else always as rigs have them
     shapes    something else in the shapes, a share of the length across the cable
     forces    something else in the forces, a share of the largest
 
@@ -17,13 +17,13 @@ A fit whitens its rows by the noise that is likeliest beforehand. What is known 
     smooth    sum_k c_k sin(k pi s / L) / k^2, k to 12; over the steps sum_o t_o / (1 + o), t_o cosines of order o
     rough     the same with 1 / k, at each step for itself, as the forces
     pattern   one wave sin(k pi s / L), or one bump at a place, or one bearing whose axis is elsewhere along or across
-              the chord (a cover that slips), as large as it likes at each step
+              the chord (a cover that slips), as large as it likes at each step; or the course of the force in one hold
     log       displacements off by more than any log scatters: photos taken before the drive stands still, say
 
 In whitened rows the covariance is
 
     C = 1 + (slow^2 - 1) E + shapes^2 D       in the photos (E: slow errors and axes),
-    C = 1 + hold^2 + forces^2 D'              for the means of the holds; what varies within a hold is as whitened,
+    C = 1 + hold^2 + forces^2 D'              for the means of the holds, and for the course in the one;
 
 and displacements, known to ``moved``, are further unknowns, as is what every rig is off by
 (`rod.inverse.base.RIG`), too little to be named. Along the eigenvectors of D all other sizes cost a sum. Notation of
@@ -71,6 +71,9 @@ BENDS = 12
 
 PLACES, WIDTH = np.linspace(0.08, 0.92, 8), 0.06
 """Of the length: middles of bumps and their standard deviation, so that neighbours overlap at half their height."""
+
+COURSE = 3
+"""Mean, slope and bend of a force in a hold: a lag of the reading or a cable that settles is no more to ten samples."""
 
 SEEN = 0.03
 """Standard deviations: directions in which the largest something else adds less are left as they are."""
@@ -174,7 +177,7 @@ class ErrorGrid:
         along = in_photos / (1.0 + in_photos) * (own.turn @ (self.roots[slow] @ rows[self.photos]))
         found[self.photos] = np.linalg.solve(self.roots[slow], own.turn.T @ along)
         in_forces = FORCES[force] ** 2 * held.size
-        means = in_forces / (1.0 + [*self.hold][hold] ** 2 + in_forces) * (held.turn @ rows[self.forces])
+        means = in_forces / (1.0 + [*self.hold][hold] ** 2 * held.shared + in_forces) * (held.turn @ rows[self.forces])
         found[self.forces] = held.turn.T @ means
         return found
 
@@ -188,7 +191,7 @@ def error_grid(observation: Observation, facts: Facts) -> ErrorGrid:
     wide = [1.0 + (slow**2 - 1.0) * share for slow in SLOW]
     roots = tuple(along / np.sqrt(one) @ along.T for one in wide)
     every = np.array([(a, b) for a in range(len(SHAPES)) for b in range(len(FORCES))])
-    none = Spread(np.zeros((0, len(photos))), np.zeros(0))
+    none = Spread(np.zeros((0, len(photos))), np.zeros(0), np.zeros(0, bool))
     over_steps = (_smooth_over_steps(count), np.eye(count))
     held = [_of_holds(observation, facts, forces, smooth) for smooth in over_steps]
     by_power = []
@@ -206,10 +209,14 @@ def error_grid(observation: Observation, facts: Facts) -> ErrorGrid:
     single = _shown(observation, facts, photos, partial(_waves, power=0))
     axes = facts.length * _rows(observation, photos, lambda photo: by_axes(photo.sections, photo.chord))
     alone = every[(every[:, 1] == 0) & (every[:, 0] > 0)]
-    patterns = np.hstack([single, bumps, axes]).T
+    patterns, single_step = np.hstack([single, bumps, axes]).T, np.eye(count)
+    chance = 1.0 / 3.0 / (len(patterns) + count)
     for pattern in patterns:
         spread = _of_photos(observation, photos, roots[0], pattern[:, None], over_steps[1])
-        kinds.append(Kind((spread,), held[1], alone, 1.0 / 3.0 / len(patterns)))
+        kinds.append(Kind((spread,), held[1], alone, chance))
+    for one in single_step:
+        spread = _of_holds(observation, facts, forces, np.outer(one, one), COURSE)
+        kinds.append(Kind((none,), spread, every[(every[:, 0] == 0) & (every[:, 1] > 0)], chance))
     log_det = np.array([np.sum(np.log(one)) for one in wide])
     shapes = np.append(SHAPES, waves)
     return ErrorGrid(photos, forces, roots, log_det, tuple(kinds), shapes, hold_sizes(observation))
@@ -243,15 +250,21 @@ def _smooth_over_steps(count: int) -> Array:
     return np.asarray(covariance / np.mean(np.diag(covariance)))
 
 
-def _of_holds(observation: Observation, facts: Facts, forces: NDArray[np.int_], over_steps: Array) -> Spread:
-    """Means of the holds, and what an error of the largest force adds to each."""
+def _of_holds(
+    observation: Observation, facts: Facts, forces: NDArray[np.int_], over_steps: Array, course: int = 1
+) -> Spread:
+    """Means of the holds, or so many orders of their courses in time, and what an error of the largest force adds."""
     held = [i for i in range(len(facts.branch)) if len(observation.forces[i])]
-    count = [len(observation.forces[i]) for i in held]
-    step = observation.rows.step[forces]
-    means = np.array([np.where(step == i, n**-0.5, 0.0) for i, n in zip(held, count, strict=True)])
-    shown = facts.force_scale * np.sqrt(count) / observation.force_std[held]
+    step, courses = observation.rows.step[forces], np.zeros((course, len(held), len(forces)))
+    for k, i in enumerate(held):
+        since = facts.hold_times[i] - facts.hold_times[i][0]
+        order = min(course, len(np.unique(since)))
+        powers = np.vander(2.0 * since / max(since[-1], 1e-300) - 1.0, order, increasing=True)
+        courses[:order, k, step == i] = np.linalg.qr(powers)[0].T
+    shown = facts.force_scale * np.sqrt([len(observation.forces[i]) for i in held]) / observation.force_std[held]
     size, turn = np.linalg.eigh(np.outer(shown, shown) * over_steps[np.ix_(held, held)])
-    return Spread(turn.T @ means.reshape(len(held), len(forces)), np.maximum(size, 0.0))
+    shared = np.arange(course * len(held)) < len(held)
+    return Spread((turn.T @ courses).reshape(-1, len(forces)), np.tile(np.maximum(size, 0.0), course), shared)
 
 
 def _shown(observation: Observation, facts: Facts, photos: NDArray[np.int_], forms: Forms) -> Array:
@@ -281,7 +294,7 @@ def _of_photos(
         factor = observation.common.whitened(factor)
     turn, size, _ = np.linalg.svd(root @ factor, full_matrices=False)
     seen = size * SHAPES[-1] > SEEN
-    return Spread(turn.T[seen], size[seen] ** 2)
+    return Spread(turn.T[seen], size[seen] ** 2, np.zeros(np.count_nonzero(seen), dtype=bool))
 
 
 def _slow_errors(observation: Observation, photos: NDArray[np.int_]) -> Array:

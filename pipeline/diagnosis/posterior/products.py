@@ -16,9 +16,10 @@ from pipeline.diagnosis.fits.workbench import SCATTER
 Array = NDArray[np.float64]
 
 AS_RIGS_ARE, WORSE, EXACT = (0.0, 1.0), 3.0, 0.1
+SCATTERS = {0.0: 0.6, SCATTER: 0.2, 5.0 * SCATTER: 0.2}
 MOVED = {
     (scatter, rig): chance * share
-    for scatter, chance in ((0.0, 0.6), (SCATTER, 0.2), (5.0 * SCATTER, 0.2))
+    for scatter, chance in SCATTERS.items()
     for rig, share in ((1.0, 0.75), (WORSE, 0.25))
 }
 MOVED |= {AS_RIGS_ARE: MOVED[AS_RIGS_ARE] - EXACT, (0.0, 0.0): EXACT}
@@ -32,10 +33,14 @@ ASTRAY, ITS_SHARE = (20.0 * SCATTER, 100.0 * SCATTER), 0.25
 
 
 class Spread(NamedTuple):
-    """Orthonormal directions ``turn`` (d, n) of rows along which something else adds the variances ``size`` (d,)."""
+    """Orthonormal directions ``turn`` (d, n) of rows along which something else adds the variances ``size`` (d,).
+
+    ``shared`` (d,): those that an error common to the samples of a hold adds to as well.
+    """
 
     turn: Array
     size: Array
+    shared: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +83,7 @@ class Products:
 
 def along(spread: Spread, rows: Array, common: Array, sizes: Array, own: int) -> tuple[Array, Array]:
     """What other variances along some directions change: sums (c, a, T) and log-determinants (c, a)."""
-    wide = 1.0 + common[:, None, None] ** 2 + sizes[None, :, None] ** 2 * spread.size
+    wide = 1.0 + common[:, None, None] ** 2 * spread.shared + sizes[None, :, None] ** 2 * spread.size
     turned = spread.turn @ rows
     change = (1.0 / wide - 1.0).reshape(len(common) * len(sizes), len(spread.size))
     mine, added = turned[:, :own], turned[:, own:]
@@ -96,12 +101,13 @@ def sums(rows: Array, own: int) -> Array:
 def with_rig(fixed: Products, displacements: int, rig: int) -> Products:
     """The products with displacements that scatter, and a rig that is off, by each of `MOVED`, in units of it.
 
-    Something else is among a rig as rigs are, and holds what displacements scatter; or it is these that are astray.
+    Something else is among a rig as rigs are; or it is the displacements that are astray.
     """
     plain, rest = np.flatnonzero(~fixed.rest), np.flatnonzero(fixed.rest)
     astray = [(size, AS_RIGS_ARE[1]) for size in ASTRAY] if displacements and rest.size else []
     models = [(size, chance, plain) for size, chance in MOVED.items()]
-    models += [(AS_RIGS_ARE, 1.0 - ITS_SHARE * bool(astray), rest)]
+    own = 1.0 - ITS_SHARE * bool(astray)
+    models += [((scatter, AS_RIGS_ARE[1]), own * chance, rest) for scatter, chance in SCATTERS.items() if rest.size]
     models += [(size, ITS_SHARE / len(astray), plain) for size in astray]
     lengths, at = [len(rows) for *_, rows in models], np.concatenate([rows for *_, rows in models])
     which, extra = np.repeat(np.arange(len(models)), lengths), displacements + rig

@@ -46,7 +46,7 @@ def covariance(grid, sizes):
     own, held = kind.shapes[slow], kind.holds
     turned = np.eye(len(grid.photos)) + (own.turn.T * grid.shapes[shape] ** 2 * own.size) @ own.turn
     whole[np.ix_(grid.photos, grid.photos)] = root @ turned @ root
-    wide = [*grid.hold][hold] ** 2 + FORCES[force] ** 2 * held.size
+    wide = [*grid.hold][hold] ** 2 * held.shared + FORCES[force] ** 2 * held.size
     whole[np.ix_(grid.forces, grid.forces)] += (held.turn.T * wide) @ held.turn
     return whole
 
