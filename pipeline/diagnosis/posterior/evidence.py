@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
+from pipeline.diagnosis.posterior.products import ASTRAY
 from pipeline.diagnosis.posterior.unknowns import (
     LOG_2PI,
     NOTHING,
@@ -147,9 +148,10 @@ def something_else(grid: ErrorGrid, fitted: Fit) -> SomethingElse:
     data, (residual, jacobian) = len(grid.photos) + len(grid.forces), fitted.as_logged
     move = conditional(solved, solved.flat, np.array([best]))[0][0]
     size, beside = jacobian.shape[1], np.hstack(of_known_size(grid, fitted))
-    by = solved.products.scales[best] * move[size:]
+    scales = solved.products.scales[best]
+    by = scales * move[size:]
     own = by[: len(fitted.beyond_log)]
-    if np.any(own):
+    if own.size and scales[0] >= ASTRAY[0]:
         return SomethingElse(beside[:, : own.size] @ own, float(np.sqrt(np.mean(own**2))))
     left = residual[:data] - jacobian[:data] @ move[:size] - beside @ by
     return SomethingElse(grid.something_else(solved.products.sizes[best], left), 0.0)

@@ -9,11 +9,12 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import norm
 
+from fixtures.aliens import with_alien
 from fixtures.continuum import Cable
 from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
 from fixtures.hidden import LOOP, Reading, hidden_test
 from fixtures.scores import SETTINGS, error_models, exact_bench
-from fixtures.trials import random_cable
+from fixtures.trials import alien_size, random_cable
 from pipeline.diagnosis import diagnose
 from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, SLOW, WAVES, hold_sizes
 from pipeline.diagnosis.posterior.evidence import SIZES, as_told, evidence, evidences, moments
@@ -303,6 +304,16 @@ def test_a_cause_is_named_beside_displacements_that_scatter():
     part, findings, _ = diagnose(faults_of_input(scattering(test, 5)), None, SETTINGS)
     assert [cause.name for cause in part.causes] == ["bearing_stiffness"], part.headline
     assert "log/displacement-scatter" in {finding.code for finding in findings}
+
+
+def test_what_has_no_name_is_told_beside_displacements_that_scatter():
+    """As much as logs scatter speaks against nothing, and is not what is told as the misfit."""
+    strange = with_alien(
+        hidden_test(Cable(), PROTOCOLS["six"], largest=LARGEST, seed=9), "waves", 16.0 * alien_size("six", "waves")
+    )
+    part, _, _ = diagnose(faults_of_input(scattering(strange, 9)), None, SETTINGS)
+    assert part.verdict == "unexplained", part.headline
+    assert part.leftover.key != "left.astray", part.leftover.message
 
 
 def test_a_law_with_a_kink_is_no_fault_of_the_simulation():
