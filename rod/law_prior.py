@@ -242,7 +242,8 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
     a : (p,)
     one : Family
     """
-    root, log_det = inverse_root(schur + one.fixed + one.form)
+    # prior and data hold every law but for rounding, and a constant one is not to fall short by it
+    root, log_det = inverse_root(schur + one.fixed + one.form, rounding=10.0 * len(a) * np.finfo(float).eps)
     turn = root.swapaxes(-1, -2)
     share, turned = np.linalg.eigh(root @ one.form @ turn)
     vectors = turn @ turned
@@ -259,11 +260,11 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
     return Conditioned(vectors, precisions, toward / precisions[..., None], evidence)
 
 
-def inverse_root(H: Array) -> tuple[Array, Array]:
+def inverse_root(H: Array, *, rounding: float = ROUNDING) -> tuple[Array, Array]:
     """W (..., r, r) with W' W = H^-1, and log|H| (...)."""
     shown = np.diagonal(H, axis1=-2, axis2=-1)
     scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
-    whole = H / (scale[..., :, None] * scale[..., None, :]) + ROUNDING * np.eye(H.shape[-1])
+    whole = H / (scale[..., :, None] * scale[..., None, :]) + rounding * np.eye(H.shape[-1])
     root = np.asarray(np.linalg.cholesky(whole), dtype=np.float64)
     log_det = 2.0 * np.log(np.diagonal(root, axis1=-2, axis2=-1) * scale).sum(axis=-1)
     return np.linalg.inv(root) / scale[..., None, :], log_det
