@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -86,9 +87,9 @@ def checked(folder: Path, settings: Settings) -> dict[str, Any]:
 
 def checked_in_time(folder: Path, tell: object, *, settings: Settings) -> dict[str, Any]:
     """The same in a process that ends when the time of a specimen is over."""
-    import pipeline.vision.series  # noqa: F401  # loaded before the time begins
     from pipeline.batch.processes import deadline
 
+    import_module("pipeline.vision.series")  # loaded before the time begins
     with deadline(settings.batch.timeout_s):
         return checked(folder, settings)
 

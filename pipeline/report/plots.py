@@ -75,14 +75,16 @@ def _words(settings: ReportSettings | None, lacking: Message | None) -> Words:
 def _figure(draw: Callable[[Area], Axes], size: tuple[float, float]) -> Figure:
     """A figure of so many px at 72 dots per inch that shows itself in a notebook."""
     with style():
-        figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72, facecolor="white")
+        figure = _Shown(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72, facecolor="white")
         draw(figure)
     figure.set_dpi(DOTS_PER_INCH)
-    figure._repr_png_ = lambda: _png(figure)  # type: ignore[attr-defined]  # what notebooks ask an object for
     return figure
 
 
-def _png(figure: Figure) -> bytes:
-    file = io.BytesIO()
-    figure.savefig(file, format="png")
-    return file.getvalue()
+class _Shown(Figure):
+    """A figure with the picture of itself that notebooks ask an object for."""
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        self.savefig(file, format="png")
+        return file.getvalue()

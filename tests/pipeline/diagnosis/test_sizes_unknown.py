@@ -41,7 +41,9 @@ def test_amounts_of_one_cause_are_of_one_size_and_sign():
     value, std = np.array([0.8, -0.1]), np.array([0.5, 0.4])
 
     def seen(size, k):
-        among = lambda a: 2.0 * norm.pdf(value[k], a, std[k]) * norm.pdf(a, 0.0, 0.5 * size)  # noqa: E731
+        def among(a):
+            return 2.0 * norm.pdf(value[k], a, std[k]) * norm.pdf(a, 0.0, 0.5 * size)
+
         return quad(among, 0.0, 8.0 * 0.5 * size, points=[min(0.8, 4.0 * size)])[0]
 
     exact = np.log(np.mean([seen(size, 0) * seen(size, 1) for size in SIZES]))
