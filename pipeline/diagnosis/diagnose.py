@@ -161,7 +161,8 @@ def _data_at_fault(bench: Workbench, known: Refits) -> Faults | None:
     """
     if bench.largest <= bench.limit:
         return None
-    for found in (force_break(bench), _item_at_fault(bench, bench.base)):
+    for sought in (force_break, lambda bench: _item_at_fault(bench, bench.base)):
+        found = sought(bench)
         if found is not None and not _causes_leave(bench, found[1] + FAULT**2, known):
             return found[0]
     return None
