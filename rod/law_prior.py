@@ -262,9 +262,38 @@ def conditioned(schur: Array, pull: Array, a: Array, one: Family) -> Conditioned
 
 def inverse_root(H: Array, *, rounding: float = ROUNDING) -> tuple[Array, Array]:
     """W (..., r, r) with W' W = H^-1, and log|H| (...)."""
+    root, scale = _root(H, rounding)
+    return np.linalg.inv(root) / scale[..., None, :], _log_squares(root, scale)
+
+
+def least(H: Array, last: int) -> tuple[Array, Array]:
+    """What the best combination of all other columns leaves of the ``last`` ones, squared, and log|H| of those others.
+
+    Parameters
+    ----------
+    H : (..., r + last, r + last)
+        Products of all columns.
+    last : int
+
+    Returns
+    -------
+    (..., last), (...)
+    """
+    root, scale = _root(H, ROUNDING)
+    first = H.shape[-1] - last
+    left = (root[..., first:, first:] ** 2).sum(axis=-1) * scale[..., first:] ** 2
+    return left, _log_squares(root[..., :first, :first], scale[..., :first])
+
+
+def _root(H: Array, rounding: float) -> tuple[Array, Array]:
+    """Cholesky factor (..., r, r) of H with all its diagonal scaled to 1, and the scale (..., r)."""
     shown = np.diagonal(H, axis1=-2, axis2=-1)
     scale = np.sqrt(np.where(shown > 1e-100, shown, 1.0))  # of an unknown that nothing shows any unit will do
-    whole = H / (scale[..., :, None] * scale[..., None, :]) + rounding * np.eye(H.shape[-1])
-    root = np.asarray(np.linalg.cholesky(whole), dtype=np.float64)
-    log_det = 2.0 * np.log(np.diagonal(root, axis1=-2, axis2=-1) * scale).sum(axis=-1)
-    return np.linalg.inv(root) / scale[..., None, :], log_det
+    whole = H / scale[..., :, None]
+    whole /= scale[..., None, :]
+    whole += rounding * np.eye(H.shape[-1])
+    return np.asarray(np.linalg.cholesky(whole), dtype=np.float64), scale
+
+
+def _log_squares(root: Array, scale: Array) -> Array:
+    return np.asarray(2.0 * np.log(np.diagonal(root, axis1=-2, axis2=-1) * scale).sum(axis=-1))

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtr
 
-from pipeline.diagnosis.posterior.products import Products, Spread, along, sums, with_rig
+from pipeline.diagnosis.posterior.products import Models, Products, Spread, along, sums, with_rig
 from rod.inverse.common_errors import shared_light
 from rod.inverse.noise import by_axes, slow_errors
 from rod.inverse.observation import Observation, PhotoData
@@ -124,8 +124,8 @@ class ErrorGrid:
         """Without something else."""
         return replace(self, kinds=tuple(kind for kind in self.kinds if kind.noise))
 
-    def products(self, columns: Array, known: Array, displacements: Array, rig: Array, added: Array) -> Products:
-        """Sums of own columns (N, o), with rows ``known`` (m, o) of prior knowledge, and of those added (N, k).
+    def models(self, columns: Array, known: Array, displacements: Array, rig: Array, added: Array) -> Models:
+        """Error models for own columns (N, o), with rows ``known`` (m, o) of prior knowledge, and those added (N, k).
 
         ``displacements`` (N, m): sensitivities to displacements that may scatter, per m, and ``rig`` (N, r); both may
         be none.
@@ -163,7 +163,7 @@ class ErrorGrid:
             log_det=np.concatenate(log_det),
             log_prior=np.concatenate(log_prior),
             rest=np.array([not kind.noise for kind in self.kinds])[positions[:, 1]],
-            scales=np.zeros((len(table), extra)),
+            scales=np.ones((len(table), extra)),
             sizes=positions,
         )
         return with_rig(found, displacements.shape[1], rig.shape[1])

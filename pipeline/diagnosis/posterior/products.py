@@ -5,7 +5,7 @@ For the notation see `pipeline.diagnosis.posterior.error_grid`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -76,9 +76,38 @@ class Products:
     scales: Array
     sizes: NDArray[np.int_]
 
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """All error models of a test: those without errors of displacements and rig, and these at each of their sizes.
+
+    Attributes
+    ----------
+    fixed : Products
+        With displacements and rig as they are said to be; these are its last own columns.
+    of : (G,) int
+        Positions among these.
+    scales, log_prior, rest :
+        See `Products`.
+    """
+
+    fixed: Products
+    of: NDArray[np.int_]
+    scales: Array
+    log_prior: Array
+    rest: NDArray[np.bool_]
+
     def at(self, kept: NDArray[np.int_]) -> Products:
-        """Those of some error models."""
-        return Products(*(getattr(self, field.name)[kept] for field in fields(self)))
+        """Sums for some of them."""
+        fixed, of, scales = self.fixed, self.of[kept], self.scales[kept]
+        own, cross = fixed.own[of], fixed.cross[of]
+        beside = np.arange(own.shape[1] - scales.shape[1], own.shape[1])
+        own[:, beside] *= scales[:, :, None]
+        own[:, :, beside] *= scales[:, None, :]
+        own[:, beside, beside] += 1.0
+        cross[:, beside] *= scales[:, :, None]
+        rest, log_prior = self.rest[kept], self.log_prior[kept]
+        return Products(own, cross, fixed.square[of], fixed.log_det[of], log_prior, rest, scales, fixed.sizes[of])
 
 
 def along(spread: Spread, rows: Array, common: Array, sizes: Array, own: int) -> tuple[Array, Array]:
@@ -98,30 +127,21 @@ def sums(rows: Array, own: int) -> Array:
     return np.concatenate([both[:, :own].ravel(), both[:, own:].ravel(), np.sum(rows[:, own:] ** 2, axis=0)])
 
 
-def with_rig(fixed: Products, displacements: int, rig: int) -> Products:
-    """The products with displacements that scatter, and a rig that is off, by each of `MOVED`, in units of it.
+def with_rig(fixed: Products, displacements: int, rig: int) -> Models:
+    """Error models with displacements that scatter, and a rig that is off, by each of `MOVED`, in units of it.
 
     Something else is among a rig as rigs are; or it is the displacements that are astray.
     """
     plain, rest = np.flatnonzero(~fixed.rest), np.flatnonzero(fixed.rest)
     astray = [(size, AS_RIGS_ARE[1]) for size in ASTRAY] if displacements and rest.size else []
+    other = 1.0 - ITS_SHARE * bool(astray)
     models = [(size, chance, plain) for size, chance in MOVED.items()]
-    own = 1.0 - ITS_SHARE * bool(astray)
-    models += [((scatter, AS_RIGS_ARE[1]), own * chance, rest) for scatter, chance in SCATTERS.items() if rest.size]
+    models += [((scatter, AS_RIGS_ARE[1]), other * chance, rest) for scatter, chance in SCATTERS.items() if rest.size]
     models += [(size, ITS_SHARE / len(astray), plain) for size in astray]
-    lengths, at = [len(rows) for *_, rows in models], np.concatenate([rows for *_, rows in models])
-    which, extra = np.repeat(np.arange(len(models)), lengths), displacements + rig
-    count = fixed.own.shape[1] - extra
-    sizes = np.repeat(np.array([size for size, *_ in models]), (displacements, rig), axis=1)
-    scales = np.hstack([np.ones((len(models), count)), sizes])[which]
-    by = scales[:, :, None]
-    return Products(
-        own=fixed.own[at] * (by * scales[:, None, :]) + np.diag(np.r_[np.zeros(count), np.ones(extra)]),
-        cross=fixed.cross[at] * by,
-        square=fixed.square[at],
-        log_det=fixed.log_det[at],
-        log_prior=fixed.log_prior[at] + np.log([chance for _, chance, _ in models])[which],
-        rest=which >= len(MOVED),
-        scales=scales[:, count:],
-        sizes=fixed.sizes[at],
+    which, of = (
+        np.repeat(np.arange(len(models)), [len(rows) for *_, rows in models]),
+        np.concatenate([m[2] for m in models]),
     )
+    scales = np.repeat(np.array([size for size, *_ in models]), (displacements, rig), axis=1)[which]
+    log_prior = fixed.log_prior[of] + np.log([chance for _, chance, _ in models])[which]
+    return Models(fixed, of, scales, log_prior, which >= len(MOVED))

@@ -18,14 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
-from pipeline.diagnosis.posterior.products import Products
+from pipeline.diagnosis.posterior.products import Models, Products
 from rod.inverse.fit import Fit
-from rod.law_prior import Conditioned, conditioned, inverse_root
+from rod.law_prior import Conditioned, conditioned, inverse_root, least
 
 Array = NDArray[np.float64]
 
 NOTHING = 20.0
 """Of log p: what lies so far below the largest is nothing whatever the prior of an amount makes of it."""
+
+FEW = 256
+"""Error models whose products a processor's cache holds."""
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 
@@ -63,21 +66,20 @@ solved_alone = lru_cache(maxsize=1)(solved_once)
 def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> Solved:
     """The unknowns of a fit for residuals (N, d) in the place of its own; ``more`` (N, k): further columns."""
     several, size = residuals.shape[1], fitted.extension.base.law.size
-    products, normal = _products(grid, fitted, more, residuals)
+    models, normal = _models(grid, fitted, more, residuals)
     law = slice(several, several + size)
+    amounts = _unknown(fitted)
+    # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
+    normal += 0.5 * len(amounts) * LOG_2PI
+    products = models.at(_that_matter(models, _by_one_prior(fitted, models, several), beside=more.shape[1] > 0))
     half, log_det = inverse_root(products.own[:, law.stop :, law.stop :])
     pull, across = np.split(half @ products.own[:, law.stop :, : law.stop], [several], axis=2)
     schur = products.own[:, law, law] - across.swapaxes(1, 2) @ across
     pulls = products.own[:, law, :several] - across.swapaxes(1, 2) @ pull
     squares = np.einsum("gdd->gd", products.own[:, :several, :several]) - np.sum(pull**2, axis=1)
-    amounts = _unknown(fitted)
-    # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
-    normal += 0.5 * len(amounts) * LOG_2PI
     common = normal - 0.5 * (squares + (products.log_det + log_det)[:, None])
-    kept = _that_matter(products, common + _by_one_prior(fitted, schur, pulls), beside=more.shape[1] > 0)
-    products, half, pull, across, common = products.at(kept), half[kept], pull[kept], across[kept], common[kept]
     a = fitted.vector[:size]
-    laws = tuple(conditioned(schur[kept], pulls[kept], a, one) for one in fitted.extension.base.law.families)
+    laws = tuple(conditioned(schur, pulls, a, one) for one in fitted.extension.base.law.families)
     flat = common[:, None, None] + np.stack([one.evidence for one in laws], axis=1)
     own = half[:, :, np.array(amounts, dtype=int) - size - len(fitted.beyond_stated)].swapaxes(1, 2)
     alone, moves, covariances = (own @ pull).swapaxes(1, 2)[:, None], [], []
@@ -89,7 +91,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     return Solved(products, half, across, pull, laws, flat, amounts, np.stack(moves, axis=1), covariance)
 
 
-def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tuple[Products, float]:
+def _models(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tuple[Models, float]:
     """Columns in the order residuals, sensitivities, displacements and rig; and the logs of the heights of priors.
 
     What the fit holds the form of its law by, and its displacements, is one prior of many, and left out. How far a law
@@ -107,7 +109,7 @@ def _products(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tu
     for row, (at, middle, std) in enumerate(places, start=len(stated)):
         known[row, :several] = (middle - fitted.vector[at]) / std
         known[row, several + at - len(beyond)] = 1.0 / std
-    found = grid.products(columns[:data], known, *of_known_size(grid, fitted), more[:data])
+    found = grid.models(columns[:data], known, *of_known_size(grid, fitted), more[:data])
     return found, sum(_log_known(fitted)) - sum(float(np.log(std)) for _, _, std in places)
 
 
@@ -117,24 +119,28 @@ def of_known_size(grid: ErrorGrid, fitted: Fit) -> tuple[Array, Array]:
     return rows[:, fitted.beyond_log], rows[:, base.rig_at] * np.array(base.rig_std)
 
 
-def _by_one_prior(fitted: Fit, schur: Array, pulls: Array) -> Array:
-    """What the law adds to log p (G, d) by the one prior that the fit holds it by, up to a constant."""
-    base = fitted.extension.base
-    wide = base.law.prior().T @ base.law.prior()
-    half, log_det = inverse_root(schur + wide)
-    toward = half @ (pulls - (wide @ fitted.vector[: len(wide)])[:, None])
-    return np.asarray(0.5 * (np.sum(toward**2, axis=1) - log_det[:, None]))
+def _by_one_prior(fitted: Fit, models: Models, several: int) -> Array:
+    """Log p (G, d) by the one prior of the law that the fit holds it by, flat in the amounts, up to a constant."""
+    prior, size = fitted.extension.base.law.prior(), fitted.extension.base.law.size
+    held = np.hstack([np.repeat(-prior @ fitted.vector[:size, None], several, axis=1), prior])
+    known, found = held.T @ held, []
+    for some in np.array_split(np.arange(len(models.of)), len(models.of) // FEW + 1):
+        products = models.at(some)
+        products.own[:, : len(known), : len(known)] += known
+        left, log_det = least(products.own[:, ::-1, ::-1], several)  # residuals last
+        found.append(-0.5 * (left[:, ::-1] + (products.log_det + log_det)[:, None]))
+    return np.concatenate(found)
 
 
-def _that_matter(products: Products, rough: Array, *, beside: bool) -> NDArray[np.int_]:
+def _that_matter(models: Models, rough: Array, *, beside: bool) -> NDArray[np.int_]:
     """Error models, with and without something else, that are not nothing by a rough log p (G, d), and the first one.
 
     Further columns ``beside`` the fit may make any of those without something else the likeliest.
     """
-    log, kept = rough + products.log_prior[:, None], np.arange(len(rough)) == 0
-    for part in (products.rest, ~products.rest):
+    log, kept = rough + models.log_prior[:, None], np.arange(len(rough)) == 0
+    for part in (models.rest, ~models.rest):
         kept |= part & np.any(log > np.max(log[part], axis=0, initial=-np.inf) - NOTHING, axis=1)
-    return np.flatnonzero(kept | (~products.rest & beside))
+    return np.flatnonzero(kept | (~models.rest & beside))
 
 
 def mean_over_laws(by_law: Array) -> Array:

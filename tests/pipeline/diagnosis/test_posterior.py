@@ -71,7 +71,8 @@ def test_products_are_those_of_dense_covariances(bench, grid):
     own, added, known = rng.normal(size=(count, 3)), rng.normal(size=(count, 2)), rng.normal(size=(4, 3))
     displacements, rig = of_known_size(grid, bench.base)
     assert rig.shape[1] == len(RIG)
-    found = grid.products(own, known, displacements, rig, added)
+    models = grid.models(own, known, displacements, rig, added)
+    found = models.at(np.arange(len(models.of)))
     for k in rng.choice(len(found.log_det), 12, replace=False):
         dense = covariance(grid, found.sizes[k])
         rows = np.hstack([own, np.hstack([displacements, rig]) * found.scales[k]])
@@ -86,7 +87,7 @@ def test_products_are_those_of_dense_covariances(bench, grid):
 
 def test_probabilities_of_error_models_sum_to_one(bench, grid):
     count = bench.observation.rows.count
-    found = grid.products(np.ones((count, 1)), np.ones((1, 1)), *np.zeros((3, count, 0)))
+    found = grid.models(np.ones((count, 1)), np.ones((1, 1)), *np.zeros((3, count, 0)))
     for rest in (True, False):
         assert np.exp(found.log_prior[found.rest == rest]).sum() == pytest.approx(1.0)
     assert all(sum(chances.values()) == pytest.approx(1.0) for chances in (SLOW, HOLD, WAVES, grid.hold, MOVED))
@@ -164,7 +165,7 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
             precisions.append(precision)
             means.append(np.linalg.solve(precision, toward))
             norms.append(norm_of - 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * means[-1] @ toward)
-    models, found, logs = one.products(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((3, rows, 0))), [], []
+    models, found, logs = one.models(np.zeros((rows, 1)), np.zeros((1, 1)), *np.zeros((3, rows, 0))), [], []
     # displacements of a log that states what they scatter have priors of their own
     facts = replace(bench.facts, displacement_std=np.full(len(bench.facts.branch), SCATTER))
     extension = replace(exact.extension, facts=facts)
@@ -173,7 +174,8 @@ def test_evidence_of_a_fit_is_the_density_of_its_data(bench, grid):
     for column in drawn.T:
         residual = np.r_[column, np.zeros(len(J) - rows + len(weak))]
         found.append(evidence(one, replace(fitted, residual=residual))[0].plain)
-    wide = [(covariance(one, sizes), chance) for sizes, chance in zip(models.sizes, models.log_prior, strict=True)]
+    every = zip(models.fixed.sizes[models.of], models.log_prior, strict=True)
+    wide = [(covariance(one, sizes), chance) for sizes, chance in every]
     for precision, mean, norm_of in zip(precisions, means, norms, strict=True):
         spread, apart = J[:rows] @ np.linalg.solve(precision, J[:rows].T), drawn - (J[:rows] @ mean)[:, None]
         logs += [normal_log(apart, noise + spread) + chance + norm_of for noise, chance in wide]
