@@ -90,10 +90,10 @@ def _find_near(photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCabl
     if cable.path_px:
         return _along_clicks(photo, cable)
     if near is not None and cable.region is None:
-        found = _find_in(photo, cable, _surroundings(near, photo))
+        found = _find_in(photo, cable, _surroundings(near, photo), near)
         if isinstance(found, RoughCable):
             return found
-    return _find_in(photo, cable, cable.region)
+    return _find_in(photo, cable, cable.region, near)
 
 
 def _along_clicks(photo: Photo, cable: Cable) -> RoughCable | Rejected:
@@ -130,21 +130,23 @@ def _widths(photo: Photo, slenderness: float) -> list[float]:
     return []
 
 
-def _find_in(photo: Photo, cable: Cable, window: Window | None) -> RoughCable | Rejected:
+def _find_in(photo: Photo, cable: Cable, window: Window | None, near: RoughCable | None) -> RoughCable | Rejected:
     """The cable in a window; where no width is known, one from border to border of what lies there."""
-    seen, found = _found(photo, cable, window)
+    seen, found = _found(photo, cable, window, near)
     if isinstance(found, Rejected) or cable.diameter_px is not None:
         return found
     whole = border_width(seen, found)
     if whole is None:
         return found
-    seen, again = _found(photo, replace(cable, diameter_px=whole), window)
+    seen, again = _found(photo, replace(cable, diameter_px=whole), window, near)
     if isinstance(again, RoughCable) and _lies_on(again, [found.path_px]) and border_width(seen, again) is None:
         return again
     return refused(photo, "photo/width.part", width_px=2.0 * found.half_width_px, whole_px=whole)
 
 
-def _found(photo: Photo, cable: Cable, window: Window | None) -> tuple[Photo, RoughCable | Rejected]:
+def _found(
+    photo: Photo, cable: Cable, window: Window | None, near: RoughCable | None
+) -> tuple[Photo, RoughCable | Rejected]:
     """The cable in a window, in all colours or in one, and the photo in these."""
     reduction = choose_reduction(photo.size, cable.diameter_px)
     standout = stand_out(photo, reduction, window=window)
@@ -153,13 +155,17 @@ def _found(photo: Photo, cable: Cable, window: Window | None) -> tuple[Photo, Ro
     if alike is None:
         return photo, found
     in_one = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
-    return (alike, in_one) if _is_better(in_one, found, cable.diameter_px) else (photo, found)
+    return (alike, in_one) if _is_better(in_one, found, cable.diameter_px, near) else (photo, found)
 
 
-def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected, diameter: float | None) -> bool:
+def _is_better(
+    in_one: RoughCable | Rejected, found: RoughCable | Rejected, diameter: float | None, near: RoughCable | None = None
+) -> bool:
     """Whether the cable is seen better in one colour: what is narrower or shorter may be a stripe or a half of it.
 
-    Of a known ``diameter`` (px), the strip that is as wide: with the colour of a shadow beside it, it is wider.
+    Of a known ``diameter`` (px), the strip that is as wide: with the colour of a shadow beside it, it is wider. Of two
+    that are alike the one that is seen as on the photo before, ``near``: light moves the edges of both, and a midline
+    that is off by the same on all photos bends no cable.
     """
     if isinstance(in_one, Rejected) or _is_piece(in_one):
         return False  # a piece of the cable may be anything of that colour too
@@ -171,7 +177,11 @@ def _is_better(in_one: RoughCable | Rejected, found: RoughCable | Rejected, diam
         wider = float(np.exp(off - off_in_one))
     if max(longer, wider) > _WIDER:
         return True
-    return in_one.evidence.firmness > found.evidence.firmness and (diameter is None or wider * _WIDER > 1.0)
+    if diameter is not None and wider * _WIDER <= 1.0:
+        return False
+    if near is not None:
+        return len(near.weights) == 1
+    return in_one.evidence.firmness > found.evidence.firmness
 
 
 def _read(photo: Photo, standout: Standout, wanted: Wanted, cable: Cable) -> RoughCable | Rejected:

@@ -42,7 +42,7 @@ from pipeline.vision.median import MAD_TO_STD, median, medians, quantile, scatte
 from pipeline.vision.photo import Closeup
 
 LEAST_SECTIONS = 12  # measured, or found in the search, at all; fewer do not fix a curve that bends both ways
-_WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
+WIDTH_FLOOR = 1.2  # px; widths of a cable of 6 px on webcam photos scatter by 0.3, its halo and shadow add as much
 _FITTED = 0.2  # of the way that fitted ramps move an edge; with 0.5 bright cables were stated off by thrice their error
 _TOGETHER = 4  # sections; fewer make no stretch of cable
 _MEDIAN = 15  # sections of a running median: two to three diameters
@@ -205,7 +205,7 @@ def _of_usual_width(width: Array) -> NDArray[np.bool_]:
     middle = median(width)
     off = np.abs(width - middle)
     # An outline may wave; and edges of webcams and JPEG are found to a third of a pixel, whatever the width.
-    limit = max(_WIDTH_DEPARTURE * middle, 4.0 * scatter(off, 0.0), _WIDTH_FLOOR)
+    limit = max(_WIDTH_DEPARTURE * middle, 4.0 * scatter(off, 0.0), WIDTH_FLOOR)
     smooth, own = (np.abs(w - middle) > limit for w in (_running_median(width), width))
     # the running median sees the first and last sections of a stretch as their neighbours outside it
     return np.asarray(~(smooth | (own & maximum_filter1d(smooth, _MEDIAN))))

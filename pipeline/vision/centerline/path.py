@@ -18,11 +18,12 @@ from pipeline.vision.centerline.edges import (
 from pipeline.vision.centerline.midline import (
     EDGE_WINDOW_BLURS,
     LEAST_SECTIONS,
+    WIDTH_FLOOR,
     Sections,
     free_of_covers,
     measure_sections,
 )
-from pipeline.vision.median import median
+from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import WIDTH_OFF, RoughCable
 from pipeline.vision.search.closeup import edge_spreads
@@ -40,6 +41,7 @@ _KNOT_SPACING_DIAMETERS = 1.5  # diameters; a cable cannot bend more sharply tha
 _MIN_INTERVALS = 16  # knot intervals; fewer bias kappa at mid-span above 0.05 %
 _PATH_KNOT_DIAMETERS = 5.0  # diameters; knots of the path that the edges are sought along
 _MOST_INTERVALS = 120  # knot intervals; bounds the time, and of more of them a gap among the points makes a bad start
+_SEARCHES = 3  # at most, each along what the one before found: a path half a width astray is back after two
 _LONGEST_CORRELATION_DIAMETERS = 2.0
 """Diameters; bound of the errors' correlation length, longer ones cannot be told from a bend."""
 
@@ -99,16 +101,22 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     if span is None:
         return _lost(rough, 0.0)
     tolerance = WIDTH_OFF * (1.0 if known else 2.0)  # a mask's width is known half as well
-    found = search_edges(closeup, path, span=span, half_width=half_width, tolerance=tolerance)
-    width = found.edges[:, 1] - found.edges[:, 0]
-    middle = median(width[found.usable]) if found.usable.any() else np.nan
-    usable = found.usable & (np.abs(width - middle) < SEARCH_RADII * half_width)
-    if np.count_nonzero(usable) < LEAST_SECTIONS:
-        return _lost(rough, float(np.mean(usable)))
+    for _ in range(_SEARCHES):
+        found = search_edges(closeup, path, span=span, half_width=half_width, tolerance=tolerance)
+        width = found.edges[:, 1] - found.edges[:, 0]
+        middle = median(width[found.usable]) if found.usable.any() else np.nan
+        off = np.abs(width - middle)
+        usable = found.usable & (off < SEARCH_RADII * half_width)
+        if np.count_nonzero(usable) < LEAST_SECTIONS:
+            return _lost(rough, float(np.mean(usable)))
+        # where a path is so far astray that it leads to other edges, they are only by chance as far apart as these
+        sure = usable & (off < max(4.0 * scatter(width[usable]), WIDTH_FLOOR))
+        where, angle = path.at(found.s)
+        edges = where[:, None] + found.edges[..., None] * normals(angle)[:, None]
+        path = follow_points(edges.mean(axis=1)[sure], start=path, s=found.s[sure])
+        if np.array_equal(sure, usable):
+            break
     diameter, half_width = 2.0 * half_width, 0.5 * middle
-    where, angle = path.at(found.s)
-    edges = where[:, None] + found.edges[..., None] * normals(angle)[:, None]
-    path = follow_points(edges.mean(axis=1)[usable], start=path, s=found.s[usable])
     where, angle = path.at(found.s)
     if blur is None:
         blur = median(edge_spreads(rough.grey, where - closeup.origin_px, normals(angle), middle))
