@@ -269,9 +269,9 @@ def _branched(ramp: Ramp, here: Point, way: Array, mode: Array, side: int) -> Po
     sign = -1.0 if (own if abs(own) > 1e-9 else side * lift) < 0.0 else 1.0
     aside = BRANCHING * np.r_[sign * mode, np.zeros(3)]
     there = ramp.corrected(here.state + aside, aside)
-    if there is not None and there.share > 1.0:
-        # the share grows with the square of the turn
-        part = np.sqrt((1.0 - here.share) / (there.share - here.share))
+    if there is not None and there.share > max(here.share, 1.0):
+        # the share grows with the square of the turn; a critical point may lie beyond 1 by what locates it
+        part = np.sqrt(max(1.0 - here.share, 0.0) / (there.share - here.share))
         goal = here.state + part * aside + 2.0 * (1.0 - here.share) * ramp.half
         goal[-1] = 1.0
         there = ramp.corrected(goal, ramp.along_share)

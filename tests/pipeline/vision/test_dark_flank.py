@@ -47,7 +47,7 @@ def test_faint_edge_of_a_dark_flank_is_found(tmp_path):
 def test_a_flank_without_an_edge_is_stated(tmp_path):
     specimen = make(Order("null", "six", 91006))
     lamp = np.array([-0.2495, -0.5157, 0.8196])
-    dim = {"sheath": np.full(3, 0.56), "ground": np.full(3, 0.09), "ambient": 0.2, "lamp": lamp / np.linalg.norm(lamp)}
+    dim = {"sheath": np.full(3, 0.56), "ground": np.full(3, 0.09), "ambient": 0.16, "lamp": lamp / np.linalg.norm(lamp)}
     look = replace(specimen.bench.look, **dim)
     (line,), (distances,) = traced(replace(specimen, bench=replace(specimen.bench, look=look)), tmp_path, 1)
     off, stated = np.sqrt(np.mean(distances**2)), line.shape.systematic_std * specimen.bench.camera.px_per_m
