@@ -142,6 +142,9 @@ class MeasuredStep:
         counted from there.
     picture : str or None
         What the file of the photo holds, such as its hash: steps with the same have one and the same photo.
+    chord_by_log : bool
+        The photo shows only one axis: the one that moves was put where it is by the displacement of the log, so the
+        chord is as wrong as that, and with it the frame of the shape.
     """
 
     step: int
@@ -158,6 +161,7 @@ class MeasuredStep:
     picture_centre: tuple[float, float] | None = None
     displacement_std: float | None = None
     picture: str | None = None
+    chord_by_log: bool = False
 
 
 @dataclass(frozen=True)

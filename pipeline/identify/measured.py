@@ -33,6 +33,7 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
     """
     lines = {photo.image: photo for photo in traces.photos if isinstance(photo, Centerline)}
     floor = settings.force_std_floor_relative * max((abs(step.force_N) for step in specimen.steps), default=0.0)
+    put = _axes_put_by_log(specimen)
     steps = tuple(
         _step(
             step,
@@ -40,6 +41,7 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
             floor,
             traces.scale.px_per_m,
             specimen.hashes.get(step.image or ""),
+            step.step in put,
         )
         for step in specimen.steps
     )
@@ -61,7 +63,19 @@ def measured_test(specimen: Specimen, traces: Traces, settings: IdentifySettings
     )
 
 
-def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float, picture: str | None) -> MeasuredStep:
+def _axes_put_by_log(specimen: Specimen) -> frozenset[int]:
+    """Numbers of the steps whose photos show no axis that moves: it went by the log from where it was on the first."""
+    rig, shown = specimen.rig, [step for step in specimen.steps if step.image in specimen.images]
+    if rig.bearings_px is None or rig.marker_diameter_m is not None:
+        return frozenset()
+    by_hand = {name for name, hints in specimen.hints.items() if hints.ends_px or hints.path_px}
+    went = (step for step in shown if step.displacement_m != shown[0].displacement_m)
+    return frozenset(step.step for step in went if step.image not in by_hand)
+
+
+def _step(
+    step: LoadStep, line: Centerline | None, floor: float, px_per_m: float, picture: str | None, put_by_log: bool
+) -> MeasuredStep:
     return MeasuredStep(
         step=step.step,
         branch=step.branch,
@@ -78,6 +92,7 @@ def _step(step: LoadStep, line: Centerline | None, floor: float, px_per_m: float
         picture_centre=None if line is None else picture_centre(line, px_per_m),
         displacement_std=step.displacement_std_m,
         picture=None if line is None else picture,
+        chord_by_log=line is not None and put_by_log,
     )
 
 

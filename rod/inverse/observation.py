@@ -234,7 +234,8 @@ def _photo_data(index: int, test: MeasuredTest, noise: PhotoNoise, functions: in
     sections = midline(step.shape, blocks=blocks) if seen and step.shape is not None else NOWHERE
     basis = smooth_basis(sections.s, test.length, functions=min(functions, len(sections.s) // 2))
     stated = step.chord_std if step.chord_std is not None else CHORD_STD * step.chord
-    whiten = _whitening(step.chord, stated, sections, basis, noise)
+    unseen = test.length if step.chord_by_log else 0.0
+    whiten = _whitening(step.chord, stated, unseen, sections, basis, noise)
     whole = float(np.hypot(stated, DISPLACEMENT_STD))
     return PhotoData(index, sections, step.chord, whole, stated, basis, whiten)
 
@@ -242,6 +243,7 @@ def _photo_data(index: int, test: MeasuredTest, noise: PhotoNoise, functions: in
 def _whitening(
     chord: float,
     chord_std: float,
+    unseen: float,
     sections: Midline,
     basis: Array,
     noise: PhotoNoise,
@@ -249,13 +251,13 @@ def _whitening(
     """Root of the information of (chord, shape components): rows have unit variance and compress the sections.
 
     With joint covariance C = L L^T of (chord, sections) and design B = diag(1, basis): L^-1 B = Q R, and ``Q^T L^-1``
-    takes residuals to components of unit variance.
+    takes residuals to components of unit variance. ``unseen`` (m): standard deviation of a chord that no photo shows.
     """
     axis = chord_std / np.sqrt(2.0)
     by_axis = by_axes(sections, chord)
     joint = np.zeros((1 + len(sections.s), 1 + len(sections.s)))
     joint[1:, 1:] = section_covariance(sections, factor=noise.factor, stretch=noise.stretch)
-    joint[0, 0] = DISPLACEMENT_STD**2
+    joint[0, 0] = DISPLACEMENT_STD**2 + unseen**2
     joint += axis**2 * by_axis @ by_axis.T
     design = linalg.block_diag(np.ones((1, 1)), basis)
     # by orthogonal factors: the polynomials of a cable seen in part are nearly dependent, and squaring them loses that

@@ -59,6 +59,8 @@ class Facts:
         Largest bend from rest up to each step, by a fitted model; empty before any is.
     rest_side : {"natural", "up", "down"}
         To which photos show the mounted cable bowed; ``natural`` without such a photo.
+    chord_by_log : (n,) m
+        Where on a photo the axis that moves was put by the log; NaN where the photo shows it. Empty if all do.
     """
 
     branch: tuple[str, ...]
@@ -78,6 +80,7 @@ class Facts:
     force_share: Array
     bends: Array = field(default_factory=lambda: np.zeros(0))
     rest_side: Branch = "natural"
+    chord_by_log: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def travel(self) -> float:
@@ -131,6 +134,7 @@ def facts_of(test: MeasuredTest) -> Facts:
         curvature_scale=bend or 1.0 / test.length,
         force_share=forces / (force or 1.0),
         rest_side=_rest_side(steps),
+        chord_by_log=np.array([step.chord if step.chord_by_log else np.nan for step in steps], dtype=float),
     )
 
 

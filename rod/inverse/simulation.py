@@ -71,10 +71,15 @@ def run(model: Model, facts: Facts, *, near: Run | None = None, patient: bool = 
 
 
 def observed(bare: Prediction, model: Model, facts: Facts) -> Prediction:
-    """The prediction as load cell and camera show it."""
+    """The prediction as load cell and camera show it, in the chord frame of what is taken for the axes."""
     for observer in model.observers:
         bare = observer(bare, facts)
-    return bare
+    by_log = np.isfinite(facts.chord_by_log)
+    if not by_log.any():
+        return bare
+    off = np.where(by_log, facts.chord_by_log - bare.chord, 0.0)
+    # x is counted from the left axis
+    return replace(bare, chord=bare.chord + off, x=bare.x + off[..., None] * (facts.moving == "left"))
 
 
 def _bare(steps: tuple[Equilibrium, ...], facts: Facts) -> Prediction:

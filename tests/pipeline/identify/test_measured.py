@@ -10,7 +10,18 @@ from pipeline.faults import faults_of_input
 from pipeline.identify import identification_parts, identify, measured_test
 from pipeline.identify.measured import picture_centre
 from pipeline.messages import Message
-from pipeline.records import CameraSpec, Centerline, LoadStep, Preview, Rejected, RigSpec, Scale, Specimen, Traces
+from pipeline.records import (
+    CameraSpec,
+    Centerline,
+    LoadStep,
+    PhotoHints,
+    Preview,
+    Rejected,
+    RigSpec,
+    Scale,
+    Specimen,
+    Traces,
+)
 from pipeline.settings import IdentifySettings
 
 PX_PER_M = 11e3
@@ -90,6 +101,20 @@ def test_a_photo_that_the_log_does_not_name_was_taken_in_the_middle_of_its_hold(
     test = measured_test(changed, traces, IdentifySettings())
     assert test.steps[1].time == pytest.approx(61.5)
     assert test.steps[0].time == specimen.steps[0].photo_time_s
+
+
+def test_an_axis_given_for_the_first_photo_goes_by_the_log_on_others(specimen, traces):
+    """Unless a marker shows it, or a person where it is on a photo."""
+    first, second, *_ = specimen.steps
+    given = replace(specimen.rig, bearings_px=((100.0, 50.0), (900.0, 50.0)))
+    images = {step.image: Path(step.image) for step in specimen.steps}
+    there = replace(specimen, rig=given, images=images, hints={second.image: PhotoHints(ends_px=given.bearings_px)})
+
+    def by_log(specimen):
+        return [step.step for step in measured_test(specimen, traces, IdentifySettings()).steps if step.chord_by_log]
+
+    assert by_log(there) == [step.step for step in specimen.steps if step not in (first, second)]
+    assert by_log(replace(there, rig=replace(given, marker_diameter_m=0.012))) == by_log(specimen) == []
 
 
 def test_a_rejected_photo_leaves_the_force(specimen, traces):
