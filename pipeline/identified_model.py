@@ -192,4 +192,5 @@ def _facts(length: float, model: IdentifiedModel) -> Facts:
         moment_scale=moment,
         curvature_scale=high - low,
         force_share=np.ones(1),
+        chord_by_log=np.full(1, np.nan),
     )

@@ -55,12 +55,12 @@ class Facts:
         Range of the curvatures met.
     force_share : (n,)
         Measured force, as a share of the largest one.
+    chord_by_log : (n,) m
+        As far from the other one the axis that moves was put on a photo by the log; NaN where the photo shows it.
     bends : (n,) 1/m
         Largest bend from rest up to each step, by a fitted model; empty before any is.
     rest_side : {"natural", "up", "down"}
         To which photos show the mounted cable bowed; ``natural`` without such a photo.
-    chord_by_log : (n,) m
-        Where on a photo the axis that moves was put by the log; NaN where the photo shows it. Empty if all do.
     """
 
     branch: tuple[str, ...]
@@ -78,9 +78,9 @@ class Facts:
     moment_scale: float
     curvature_scale: float
     force_share: Array
+    chord_by_log: Array
     bends: Array = field(default_factory=lambda: np.zeros(0))
     rest_side: Branch = "natural"
-    chord_by_log: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def travel(self) -> float:

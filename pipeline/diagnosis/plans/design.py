@@ -227,6 +227,7 @@ def _facts(plan: Plan) -> Facts:
         moment_scale=force * bow,
         curvature_scale=np.pi**2 * bow / plan.length**2,
         force_share=np.array([float(branch != "mounted") for _, branch in steps]),
+        chord_by_log=np.full(len(steps), np.nan),
     )
 
 

@@ -82,6 +82,7 @@ def more_steps(facts: Facts, displacements: list[float], branches: list[str]) ->
     """Circumstances with further steps at the end, held and timed like the last one."""
     count = len(displacements)
     cycle = float(facts.clock[-1] - facts.clock[-2]) if len(facts.clock) > 1 else 60.0
+    by_log = facts.chord_by_log[-1] + facts.displacement[-1] - np.array(displacements)
     return replace(
         facts,
         branch=(*facts.branch, *branches),
@@ -92,6 +93,7 @@ def more_steps(facts: Facts, displacements: list[float], branches: list[str]) ->
         force_share=np.r_[facts.force_share, [float(branch != "mounted") for branch in branches]],
         clock=np.r_[facts.clock, facts.clock[-1] + cycle * np.arange(1, count + 1)],
         picture_centre=np.vstack([facts.picture_centre, np.repeat(facts.picture_centre[-1:], count, axis=0)]),
+        chord_by_log=np.r_[facts.chord_by_log, by_log],
     )
 
 
@@ -124,6 +126,7 @@ def planned_test(made: Run, facts: Facts, precision: Precision, *, photos: bool 
                 hold_times=facts.clock[i] + times if facts.timed else None,
                 hold_forces=seen.samples[i],
                 picture_centre=(float(facts.picture_centre[i, 0]), float(facts.picture_centre[i, 1])),
+                chord_by_log=bool(np.isfinite(facts.chord_by_log[i])),
             )
         )
     return MeasuredTest(

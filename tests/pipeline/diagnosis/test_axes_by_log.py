@@ -10,6 +10,7 @@ from fixtures.effects import HIDE, LARGEST, Form
 from fixtures.hidden import SIX, hidden_test
 from fixtures.trials import f_error
 from pipeline.diagnosis import diagnose
+from pipeline.diagnosis.plans.plan import more_steps
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.base_fit import base_fit
@@ -47,6 +48,15 @@ def test_where_the_axis_was_put_tells_nothing(yielding, moving):
     one, other = (found.fitted for found in fits)
     assert one.chi2 == pytest.approx(other.chi2, rel=2e-3)
     assert one.vector == pytest.approx(other.vector, abs=2e-3 * np.abs(one.vector).max())
+
+
+def test_further_steps_are_planned_alike(yielding):
+    test = put_by_log(yielding[0])
+    facts, last = facts_of(test), test.steps[-1]
+    more = more_steps(facts, [last.displacement - 1e-3], ["unloading"])
+    assert np.isnan(more.chord_by_log[0]) and more.chord_by_log[-1] == pytest.approx(last.chord + 1e-3)
+    seen = facts_of(yielding[0])
+    assert np.isnan(more_steps(seen, [1e-3], ["loading"]).chord_by_log).all()
 
 
 def test_what_moves_the_axis_is_told_from_the_shapes(yielding):
