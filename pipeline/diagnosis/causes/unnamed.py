@@ -36,9 +36,9 @@ from rod.inverse.prediction import Facts, Model
 
 Array = NDArray[np.float64]
 
-SIZES = (0.01, 0.003, 0.03)
+SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Of the largest force, moment or bend, their standard deviation: steps of a factor 3.3, over which a normal density
-hardly changes, from what is just seen to what is another experiment; the middle one is tried first."""
+hardly changes, from what is just seen to what is another experiment; the second one is tried first."""
 
 SHARE = 0.25
 """Of the probability of something else beforehand: of what begins between two holds, and of unknown forces."""
@@ -144,6 +144,11 @@ class _Unknown(Cause):
         orders = range(len(facts.branch))
         known = {(label, o): size * WAVES.get(label, 1.0) ** -2.0 / (1 + o) for o in orders for label in labels}
         return tuple(Term(self, Variant(label, at=float(o), known=std)) for (label, o), std in known.items())
+
+    @staticmethod
+    def place_of(terms: Sequence[Term]) -> tuple[str, ...]:
+        """Where forces or moments act, as in `places`."""
+        return tuple(dict.fromkeys(term.variant.label for term in terms))
 
     def since(self, terms: Sequence[Term], facts: Facts) -> Iterator[tuple[Term, ...]]:
         """The same ones, from each step under load but the first on."""

@@ -225,24 +225,36 @@ class Search:
             self._weigh_unknown(unknown, hopeless)
 
     def _weigh_unknown(self, unknown: UnknownForces | UnknownMoments | UnknownBends, hopeless: float) -> None:
-        """Forces or moments of a middle size at each place, where they are likeliest of other sizes and begins too."""
-        facts, (middle, *others) = self.bench.facts, SIZES
-        ways = {unknown.ways(facts, labels, middle): labels for labels in unknown.places.values()}
-        found = self._weigh_unnamed((), self._with(ways, hopeless))
+        """Forces or moments of one size at each place, where they are likeliest of other sizes, and begins too."""
+        facts, (smaller, first, *larger) = self.bench.facts, SIZES
+        everywhere = [*unknown.places.values()]
+        found = self._weigh_unnamed((), self._with((unknown.ways(facts, at, first) for at in everywhere), hopeless))
         if not found:
             return
-        labels = ways[max(found, key=_rest).terms]
-        found += self._weigh_unnamed((), self._with((unknown.ways(facts, labels, size) for size in others), hopeless))
-        best = max(found, key=_rest)
+        best, size = max(found, key=_rest), first
+        place = unknown.place_of(best.terms)
+        for other in larger if _beyond(best) else (smaller,):
+            ends = [unknown.ways(facts, place, other)]
+            there = max(self._weigh_unnamed((), self._with(ends, hopeless, best.found)), key=_rest, default=best)
+            if there.rest <= best.rest:
+                break
+            best, size = there, other
+        if size != first:
+            ends = [unknown.ways(facts, at, size) for at in everywhere if at != place]
+            best = max([best, *self._weigh_unnamed((), self._with(ends, hopeless))], key=_rest)
         if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
             self._weigh_unnamed((), self._with(unknown.since(best.terms, facts), hopeless))
 
-    def _with(self, every: Iterable[tuple[Term, ...]], hopeless: float) -> Iterator[Fit]:
-        """The base model with terms from nothing, fitted."""
+    def _with(
+        self, every: Iterable[tuple[Term, ...]], hopeless: float, near: Explanation | None = None
+    ) -> Iterator[Fit]:
+        """The base model with terms from nothing, or as large as in a fit ``near``, fitted."""
         base = self.bench.base
         for terms in every:
-            start = np.append(base.vector, np.zeros(len(terms)))
-            yield fit_from(self.bench.observation, replace(base.extension, terms=terms), start, base, hopeless=hopeless)
+            extension = replace(base.extension, terms=terms)
+            start = np.append(base.vector, np.zeros(len(terms))) if near is None else near.fitted.vector
+            about = base if near is None else near.fitted
+            yield fit_from(self.bench.observation, extension, start, about, hopeless=hopeless)
 
     def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> list[Hypothesis]:
         seen = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)
@@ -264,6 +276,15 @@ class Search:
 
 def _rest(one: Hypothesis) -> float:
     return one.rest
+
+
+def _beyond(one: Hypothesis) -> bool:
+    """Whether amounts are larger than was known of them beforehand, in the mean of their squares."""
+    if one.found is None:
+        return False
+    extension = one.found.fitted.extension
+    known = [term.variant.known * term.cause.plausible(extension.facts) for term in extension.terms]
+    return bool(np.mean((one.found.fitted.vector[[*extension.amounts_at]] / known) ** 2) > 1.0)
 
 
 def searched(bench: Workbench, known: Refits | None = None) -> Search:
