@@ -113,7 +113,7 @@ def fit_term(
             continue
         found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
-            best = found
+            best, hopeless = found, min(hopeless, found.chi2)  # from elsewhere only what leads lower is of use
     return best
 
 
