@@ -27,7 +27,7 @@ LEAST_SHARE = 0.02
 """Of the sum of all forms: what has less of it is not tried by itself."""
 
 
-def with_all_components(observation: Observation, fitted: Fit, term: Term) -> Fit:
+def with_all_components(observation: Observation, fitted: Fit, term: Term, *, hopeless: float = np.inf) -> Fit:
     """Fit the other components of the thing that a term of the model is one of, if they are not in it yet.
 
     From nothing; from as much as there is of the term where amounts have one sign, and the trace of little may be none.
@@ -40,7 +40,7 @@ def with_all_components(observation: Observation, fitted: Fit, term: Term) -> Fi
         return fitted
     begin = fitted.amount(known.terms_of(cause)[0])[0] if cause.sign else 0.0
     start = np.r_[fitted.vector, np.full(len(added), begin)]
-    found = fit_from(observation, replace(known, terms=(*known.terms, *added)), start, fitted)
+    found = fit_from(observation, replace(known, terms=(*known.terms, *added)), start, fitted, hopeless=hopeless)
     return fitted if found.run.prediction is None else found
 
 

@@ -94,15 +94,18 @@ def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanat
     return new
 
 
-def by_step(bench: Workbench, one: Explanation) -> list[Explanation]:
-    """An explanation with causes (of one form each) that differ from step to step, in one way at a time."""
+def by_step(bench: Workbench, one: Explanation, *, hopeless: float = np.inf) -> list[Explanation]:
+    """An explanation with causes (of one form each) that differ from step to step, in one way at a time.
+
+    ``hopeless``: chi-square above which that is of no use.
+    """
     known, found = one.fitted.extension, []
     for kind in (bench.suspicion.causes[cause] for cause in one.causes):
         own = known.terms_of(kind)
         for forms in kind.by_step(one.fitted.amount(own[0])[0], bench.facts) if len(own) == 1 else ():
             extension = replace(known, terms=(*known.terms, *(Term(kind, form) for form in forms)))
             start = np.r_[one.fitted.vector, np.zeros(len(forms))]
-            fitted = fit_from(bench.observation, extension, start, one.fitted)
+            fitted = fit_from(bench.observation, extension, start, one.fitted, hopeless=hopeless)
             if fitted.run.prediction is not None:
                 found.append(explanation_of(one.causes, bench.base, fitted))
     return found

@@ -95,7 +95,7 @@ class Search:
             for one in known_refits(bench.observation, bench.base, bench.suspicion, cause, self.known, rival=rival):
                 if one.gain > 0.0:
                     rival = min(rival, one.fitted.chi2)
-                    yield from (one, *by_step(bench, one))
+                    yield from (one, *by_step(bench, one, hopeless=rival + LEAST))
 
     def likeliest(self) -> list[Explanation]:
         """The likeliest single causes, and what is nearly as likely as the first one in another form of it."""

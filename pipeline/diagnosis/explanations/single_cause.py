@@ -18,7 +18,7 @@ from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
 from rod.inverse.base_fit import settled
 from rod.inverse.cause import Profile
-from rod.inverse.fit import FITS, Fit
+from rod.inverse.fit import FITS, Fit, fit_from
 from rod.inverse.observation import Observation
 
 ALSO = 0.01
@@ -39,13 +39,15 @@ def refits(
     to what was found. ``rival`` is the chi-square another cause has reached: one that stays far above it after its
     first fit is not tried from other starts and with further forms.
     """
-    kind = suspicion.causes[cause]
-    found = [*_by_kind(observation, base, suspicion, cause, hopeless=rival + LEAST).values()]
+    kind, hopeless = suspicion.causes[cause], rival + LEAST
+    found = [*_by_kind(observation, base, suspicion, cause, hopeless=hopeless).values()]
     if kind.additive:
         found = [in_all_forms(observation, one, kind, one.extension.terms[-1].variant.setting) for one in found]
     # one component alone is left beside all of them for the evidence to choose
     parts = ((one, one.extension.terms[-1]) for one in found)
-    found += [with_all_components(observation, one, term) for one, term in parts if term.variant.component]
+    found += [
+        with_all_components(observation, one, term, hopeless=hopeless) for one, term in parts if term.variant.component
+    ]
     # half a cost is minus the logarithm of a likelihood
     enough = min(map(cost, found), default=np.inf) - 2.0 * np.log(ALSO)
     found = [one for one in dict.fromkeys(found) if cost(one) < enough]
@@ -109,7 +111,9 @@ def _fit_form(
     found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
     if found is None or found.converged:
         return found
-    tried = [settled(observation, found)]
+    if found.chi2 > hopeless:  # it goes on as far as it may still come near
+        found = fit_from(observation, found.extension, found.vector, found, hopeless=hopeless)
+    tried = [found if found.chi2 > hopeless else settled(observation, found)]
     if suspicion.terms[direction].variant.tuned:
         held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
         tried += [] if held is None else [held]
