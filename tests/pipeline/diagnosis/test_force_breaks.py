@@ -122,7 +122,7 @@ def test_no_cause_is_a_break(name, amount):
     assert fault(hidden_test(cable, PROTOCOLS["loop"], largest=LARGEST, seed=32, reading=reading)) is None
 
 
-def test_the_rest_of_the_diagnosis_goes_on_with_the_corrected_forces(honest):
+def test_the_rest_of_the_diagnosis_goes_on_with_the_corrected_forces_and_their_errors(honest):
     test = spoiled(honest["six"], lambda i, force: force * (0.5 if i >= 4 else 1.0))
     part, findings, faults = diagnose(faults_of_input(test), None, SETTINGS)
     assert part.verdict == "adequate" and [finding.code for finding in findings] == ["force/factor"]
@@ -130,6 +130,10 @@ def test_the_rest_of_the_diagnosis_goes_on_with_the_corrected_forces(honest):
     assert np.array([s.force for s in faults.test.steps]) == pytest.approx(
         [s.force for s in honest["six"].steps], rel=5e-3
     )
+    (told,) = part.corrected_forces
+    (error,) = faults.test.common_force_errors
+    assert told.errors_N == [list(error.values())]
+    assert set(error) == {4, 5, 6} and 1e-4 < abs(error[4]) / honest["six"].steps[4].force < 0.02
 
 
 @pytest.mark.parametrize("kind", ["factor", "zero"])
@@ -161,12 +165,3 @@ def test_two_kinds_that_are_not_told_apart_are_an_error_too(honest, either):
     by_factor = corrected + np.sqrt(2.0) * other
     assert (truth + 0.3) / by_factor == pytest.approx(np.full(4, 1.09), abs=0.01)
     assert np.ptp((truth + 0.3) / by_factor) < 1e-6
-
-
-def test_errors_of_a_correction_go_with_the_result(honest):
-    halved = spoiled(honest["loop"], lambda i, force: force * (0.5 if i >= 4 else 1.0))
-    part, _, faults = diagnose(faults_of_input(halved), None, SETTINGS)
-    (told,) = part.corrected_forces
-    (error,) = faults.test.common_force_errors
-    assert told.errors_N == [list(error.values())]
-    assert set(error) == {4, 5, 6} and 1e-4 < abs(error[4]) / honest["loop"].steps[4].force < 0.02
