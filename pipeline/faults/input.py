@@ -4,7 +4,7 @@ Photographed chords are held against the displacement log (order of photos, unit
 traced against stated length, forces against what a cable can do (sign) and against each other (stuck).
 
 Codes: ``photo/order``, ``photo/doubled``, ``photo/moving-apart``, ``force/sign``, ``force/stuck``, ``log/unit``,
-``log/displacement``, ``length/traced``, ``length/other-cable``.
+``log/displacement``, ``length/traced``, ``length/other-cable``, ``rig/axis-by-log``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from pipeline.faults.record import Faults
 from pipeline.faults.stuck_forces import stuck_forces
-from pipeline.records import Array, doubtful, failed
+from pipeline.records import Array, doubtful, failed, inferred
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 
 UNITS = {1e3: "m", 1e-3: "um", 10.0: "cm", 25.4: "inches"}
@@ -61,6 +61,7 @@ def faults_of_input(test: MeasuredTest) -> Faults:
         _displacement,
         _moving_apart,
         _traced_length,
+        _axis_by_log,
         _forces,
         _stuck,
     )
@@ -241,7 +242,9 @@ def _moving_apart(found: Faults) -> Faults:
 def _traced_length(found: Faults) -> Faults:
     """All photos show another length than the one stated."""
     test = found.test
-    traced = [float(step.shape.s[-1]) for i, step in enumerate(test.steps) if step.shape and i not in found.photos]
+    used = [step for i, step in enumerate(test.steps) if step.shape and i not in found.photos]
+    used = [step for step in used if not step.chord_by_log] or used
+    traced = [float(step.shape.s[-1]) for step in used if step.shape]
     if not traced:
         return Faults(test)
     off = float(np.median(traced)) / test.length - 1.0
@@ -252,6 +255,13 @@ def _traced_length(found: Faults) -> Faults:
     # covers above the cable are seen too far apart, never too near: then neither need be wrong
     key = "length/traced.covers" if off > 0.0 and test.axis_parallax_std > 0.0 else "length/traced"
     return Faults(test, (doubtful(key, seen_m=np.median(traced), stated_m=test.length),))
+
+
+def _axis_by_log(found: Faults) -> Faults:
+    """Photos that do not show where the axis that moves is."""
+    count = sum(step.chord_by_log for step in found.test.steps)
+    told = (inferred("rig/axis-by-log", count=count, moving=found.test.moving),) if count else ()
+    return Faults(found.test, told)
 
 
 def _forces(found: Faults) -> Faults:

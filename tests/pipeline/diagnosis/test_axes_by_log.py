@@ -50,6 +50,15 @@ def test_where_the_axis_was_put_tells_nothing(yielding, moving):
     assert one.vector == pytest.approx(other.vector, abs=2e-3 * np.abs(one.vector).max())
 
 
+def test_lengths_by_the_log_doubt_no_length(yielding):
+    """The photo that shows both axes tells it; the others are told once."""
+    far = put_by_log(yielding[0], 0.03 * yielding[0].length)
+    moved = [replace(step, shape=replace(step.shape, s=1.03 * step.shape.s)) for step in far.steps[1:]]
+    found = faults_of_input(replace(far, steps=(far.steps[0], *moved))).findings
+    assert [finding.code for finding in found] == ["rig/axis-by-log"]
+    assert f"on {len(moved)} others" in found[0].message and "left" in found[0].message
+
+
 def test_further_steps_are_planned_alike(yielding):
     test = put_by_log(yielding[0])
     facts, last = facts_of(test), test.steps[-1]
