@@ -138,10 +138,8 @@ def with_rig(fixed: Products, displacements: int, rig: int) -> Models:
     models = [(size, chance, plain) for size, chance in MOVED.items()]
     models += [((scatter, AS_RIGS_ARE[1]), other * chance, rest) for scatter, chance in SCATTERS.items() if rest.size]
     models += [(size, ITS_SHARE / len(astray), plain) for size in astray]
-    which, of = (
-        np.repeat(np.arange(len(models)), [len(rows) for *_, rows in models]),
-        np.concatenate([m[2] for m in models]),
-    )
+    which = np.repeat(np.arange(len(models)), [len(rows) for *_, rows in models])
+    of = np.concatenate([rows for *_, rows in models])
     scales = np.repeat(np.array([size for size, *_ in models]), (displacements, rig), axis=1)[which]
     log_prior = fixed.log_prior[of] + np.log([chance for _, chance, _ in models])[which]
     return Models(fixed, of, scales, log_prior, which >= len(MOVED))

@@ -109,7 +109,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
         usable = found.usable & (off < SEARCH_RADII * half_width)
         if np.count_nonzero(usable) < LEAST_SECTIONS:
             return _lost(rough, float(np.mean(usable)))
-        # where a path is so far astray that it leads to other edges, they are only by chance as far apart as these
+        # a path far astray leads to other edges, which are only by chance as far apart as the cable's
         sure = usable & (off < max(4.0 * scatter(width[usable]), WIDTH_FLOOR))
         where, angle = path.at(found.s)
         edges = where[:, None] + found.edges[..., None] * normals(angle)[:, None]
