@@ -11,7 +11,8 @@ And forces may act that no model has, as they come and go over the steps, from t
 of order o, normal about nothing, of a standard deviation that falls with 1 / (1 + o):
 
 moments         at one bearing or both: a stop, a cable that is led in
-forces          across the chord, at a place: a support that is touched, a tether
+forces          at a place, across the chord, and along it as well where that is likelier: a support without friction
+                pushes along the normal of the cable, a tether wherever it is tied to
 bends           all along the cable, by moments in half waves: loads of one to four half waves, as likely each (a pad, a
                 magnet, a table that rubs), have moments M'' = q that fall with the square of their number. A moment M
                 bends the cable as a rest that is moved by M / f_EI does, and is told as that curvature
@@ -48,6 +49,9 @@ WAVES = {f"{k} half waves": float(k) for k in (1, 2, 3, 4)}
 
 POINTS = {f"{u:.1f}": u for u in (0.1, 0.3, 0.5, 0.7, 0.9)}
 """Shares of the length near which one may act."""
+
+ALONG = "along the chord"
+"""Setting of forces that act so."""
 
 GROWS = (("as it begins", 0.0), ("growing", 1.0))
 """Labels of what stays as it begins, and of what grows by as much in every further hold."""
@@ -150,6 +154,10 @@ class _Unknown(Cause):
         """Where forces or moments act, as in `places`."""
         return tuple(dict.fromkeys(term.variant.label for term in terms))
 
+    def freer(self, terms: Sequence[Term]) -> Iterator[tuple[Term, ...]]:
+        """The same ones with more beside them; none where there is no more."""
+        return iter(())
+
     def since(self, terms: Sequence[Term], facts: Facts) -> Iterator[tuple[Term, ...]]:
         """The same ones, from each step under load but the first on."""
         for first in facts.pushed[1:]:
@@ -167,7 +175,8 @@ class _Unknown(Cause):
     def together(self, forms: Sequence[Variant], facts: Facts) -> tuple[str, Array]:
         """Force or moment at every step, for one form along the cable after the other."""
         labels = dict.fromkeys(form.label for form in forms)
-        rows = [[self.course(form, facts) * (form.label == label) for form in forms] for label in labels]
+        own = [[form.label == label and form.setting != ALONG for form in forms] for label in labels]
+        rows = [[self.course(form, facts) * one for form, one in zip(forms, some, strict=True)] for some in own]
         return self.unit, np.concatenate(np.array(rows).swapaxes(1, 2))
 
 
@@ -221,10 +230,17 @@ class UnknownForces(_Unknown):
         """The terms of forces near a place, and where they act."""
         return *super().ways(facts, labels, size), Term(PLACE, Variant(labels[0], known=1.0))
 
+    def freer(self, terms: Sequence[Term]) -> Iterator[tuple[Term, ...]]:
+        """The same ones, and as many along the chord; what says where they act stays the last one."""
+        *across, place = terms
+        along = (term._replace(variant=replace(term.variant, setting=ALONG)) for term in across)
+        yield *across, *along, place
+
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Push the cable by ``amount``, as its course says."""
-        across = np.outer(amount * self.course(variant, facts), _at(POINTS[variant.label], _joints(model)))
-        return _pushed(model, np.stack([np.zeros_like(across), across], axis=2), model.bending.forces_by_step)
+        force = np.outer(amount * self.course(variant, facts), _at(POINTS[variant.label], _joints(model)))
+        way = np.array([1.0, 0.0] if variant.setting == ALONG else [0.0, 1.0])
+        return _pushed(model, force[:, :, None] * way, model.bending.forces_by_step)
 
 
 class PlaceOfForce(Cause):
@@ -242,11 +258,32 @@ class PlaceOfForce(Cause):
         """That of the force is all there is."""
         return 1.0
 
+    @staticmethod
+    def course(variant: Variant, facts: Facts) -> Array:
+        """The same at all steps."""
+        return np.ones(len(facts.branch))
+
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let the forces act at ``amount`` (of the length) beyond their place."""
         forces, joints = model.bending.forces_by_step, _joints(model)
         whole = np.zeros((1, 2)) if forces is None else forces.sum(axis=1)
         return _pushed(model, whole[:, None, :] * _at(POINTS[variant.label] + amount, joints)[:, None])
+
+
+def carried_over(terms: Sequence[Term], known: Sequence[Term], amounts: Array, facts: Facts) -> Array:
+    """Amounts (k,) of terms that make what others of given ``amounts`` make at each step; none of what these lack."""
+
+    def course_of(term: Term) -> Array:
+        assert isinstance(term.cause, _Unknown | PlaceOfForce)
+        return term.cause.course(term.variant, facts)
+
+    start = np.zeros(len(terms))
+    of = [[(term.cause, term.variant.label, term.variant.setting) for term in some] for some in (terms, known)]
+    for one in dict.fromkeys(of[0]):
+        own, old = ([k for k, other in enumerate(some) if other == one] for some in of)
+        made = sum((amounts[k] * course_of(known[k]) for k in old), np.zeros(len(facts.branch)))
+        start[own] = np.linalg.lstsq(np.column_stack([course_of(terms[k]) for k in own]), made, rcond=None)[0]
+    return start
 
 
 def _joints(model: Model) -> Array:

@@ -19,7 +19,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.diagnosis.causes.unnamed import BEGUN, SIZES, UNKNOWN, UnknownBends, UnknownForces, UnknownMoments
+from pipeline.diagnosis.causes.unnamed import (
+    BEGUN,
+    SIZES,
+    UNKNOWN,
+    UnknownBends,
+    UnknownForces,
+    UnknownMoments,
+    carried_over,
+)
 from pipeline.diagnosis.explanations.candidates import LEAST, candidates, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
@@ -226,35 +234,36 @@ class Search:
 
     def _weigh_unknown(self, unknown: UnknownForces | UnknownMoments | UnknownBends, hopeless: float) -> None:
         """Forces or moments of one size at each place, where they are likeliest of other sizes, and begins too."""
-        facts, (smaller, first, *larger) = self.bench.facts, SIZES
+        facts, (smaller, first, *larger), base = self.bench.facts, SIZES, self.bench.base
         everywhere = [*unknown.places.values()]
-        found = self._weigh_unnamed((), self._with((unknown.ways(facts, at, first) for at in everywhere), hopeless))
+
+        def tried(every: Iterable[tuple[Term, ...]], near: Fit) -> list[Hypothesis]:
+            return self._weigh_unnamed((), self._with(every, near, hopeless))
+
+        found = tried((unknown.ways(facts, at, first) for at in everywhere), base)
         if not found:
             return
         best, size = max(found, key=_rest), first
         place = unknown.place_of(best.terms)
         for other in larger if _beyond(best) else (smaller,):
-            ends = [unknown.ways(facts, place, other)]
-            there = max(self._weigh_unnamed((), self._with(ends, hopeless, best.found)), key=_rest, default=best)
+            there = max(tried([unknown.ways(facts, place, other)], _fit_of(best)), key=_rest, default=best)
             if there.rest <= best.rest:
                 break
             best, size = there, other
         if size != first:
-            ends = [unknown.ways(facts, at, size) for at in everywhere if at != place]
-            best = max([best, *self._weigh_unnamed((), self._with(ends, hopeless))], key=_rest)
+            others = tried((unknown.ways(facts, at, size) for at in everywhere if at != place), base)
+            best = max([best, *others], key=_rest)
+        best = max([best, *tried(unknown.freer(best.terms), _fit_of(best))], key=_rest)
         if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
-            self._weigh_unnamed((), self._with(unknown.since(best.terms, facts), hopeless))
+            tried(unknown.since(best.terms, facts), _fit_of(best))
 
-    def _with(
-        self, every: Iterable[tuple[Term, ...]], hopeless: float, near: Explanation | None = None
-    ) -> Iterator[Fit]:
-        """The base model with terms from nothing, or as large as in a fit ``near``, fitted."""
-        base = self.bench.base
+    def _with(self, every: Iterable[tuple[Term, ...]], near: Fit, hopeless: float) -> Iterator[Fit]:
+        """The base model with terms, fitted from a fit ``near`` and from what these terms make alike in it."""
+        base, known = self.bench.base.extension, near.extension
         for terms in every:
-            extension = replace(base.extension, terms=terms)
-            start = np.append(base.vector, np.zeros(len(terms))) if near is None else near.fitted.vector
-            about = base if near is None else near.fitted
-            yield fit_from(self.bench.observation, extension, start, about, hopeless=hopeless)
+            start = carried_over(terms, known.terms, near.vector[[*known.amounts_at]], base.facts)
+            start = np.r_[near.vector[: len(base.base.names)], start]
+            yield fit_from(self.bench.observation, replace(base, terms=terms), start, near, hopeless=hopeless)
 
     def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> list[Hypothesis]:
         seen = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)
@@ -278,13 +287,16 @@ def _rest(one: Hypothesis) -> float:
     return one.rest
 
 
+def _fit_of(one: Hypothesis) -> Fit:
+    assert one.found is not None
+    return one.found.fitted
+
+
 def _beyond(one: Hypothesis) -> bool:
     """Whether amounts are larger than was known of them beforehand, in the mean of their squares."""
-    if one.found is None:
-        return False
-    extension = one.found.fitted.extension
+    fitted, extension = _fit_of(one), _fit_of(one).extension
     known = [term.variant.known * term.cause.plausible(extension.facts) for term in extension.terms]
-    return bool(np.mean((one.found.fitted.vector[[*extension.amounts_at]] / known) ** 2) > 1.0)
+    return bool(np.mean((fitted.vector[[*extension.amounts_at]] / known) ** 2) > 1.0)
 
 
 def searched(bench: Workbench, known: Refits | None = None) -> Search:

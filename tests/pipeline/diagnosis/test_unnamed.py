@@ -95,12 +95,18 @@ STOP = 0.3
 """rad."""
 
 
-@pytest.mark.parametrize(("protocol", "seed", "place", "force"), [("six", 89, 0.62, -0.1), ("loop", 90, 0.27, -0.07)])
-def test_a_cable_that_meets_something(protocol, seed, place, force):
-    """From a step on it is pushed back at one place, which is told, with the force; f_EI beside it holds."""
+@pytest.mark.parametrize(
+    ("protocol", "seed", "place", "force", "along"),
+    [("six", 89, 0.62, -0.1, 0.0), ("loop", 90, 0.27, -0.07, 0.0), ("six", 91, 0.66, -0.6, -0.25)],
+)
+def test_a_cable_that_meets_something(protocol, seed, place, force, along):
+    """From a step on it is pushed back at one place, which is told, with the force; f_EI beside it holds.
+
+    A post without friction pushes along the normal of the cable, which leans there, and harder than the bearings do.
+    """
     cable = Cable()
-    met = replace(cable, shove=lambda u: force / (1.0 + np.exp((u - place) / 0.01)))
-    test = changed(cable, met, protocol, 4, seed=seed)
+    beyond = [lambda u, size=size: size / (1.0 + np.exp((u - place) / 0.01)) for size in (along, force)]
+    test = changed(cable, replace(cable, tow=beyond[0], shove=beyond[1]), protocol, 4, seed=seed)
     part, _, _ = among(test, "")
     assert part.verdict == "unexplained" and part.leftover.key == "unnamed.forces", part.headline
     assert part.next_experiment.key == "next.look"
