@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 NOTHING = 20.0
 """Of log p: what lies so far below the largest is nothing whatever the prior of an amount makes of it."""
 
-FEW = 256
+AT_ONCE = 256
 """Error models whose products a processor's cache holds."""
 
 LOG_2PI = float(np.log(2.0 * np.pi))
@@ -124,7 +124,7 @@ def _by_one_prior(fitted: Fit, models: Models, several: int) -> Array:
     prior, size = fitted.extension.base.law.prior(), fitted.extension.base.law.size
     held = np.hstack([np.repeat(-prior @ fitted.vector[:size, None], several, axis=1), prior])
     known, found = held.T @ held, []
-    for some in np.array_split(np.arange(len(models.of)), len(models.of) // FEW + 1):
+    for some in np.array_split(np.arange(len(models.of)), len(models.of) // AT_ONCE + 1):
         products = models.at(some)
         products.own[:, : len(known), : len(known)] += known
         left, log_det = least(products.own[:, ::-1, ::-1], several)  # residuals last
