@@ -1,13 +1,6 @@
-"""What acts on the cable and is no cause of the catalogue: it rolled, a strand broke, something touches it.
+"""What pushes or bends the cable and is no cause of the catalogue: something touches it, holds it, leads it in.
 
-Three things may begin between two holds, and stay as they are or grow from hold to hold; each hold but the first is a
-form of its own:
-
-pre-curvature   K0 is another one from a hold on: the cable rolled about its axis, or was laid in anew
-stiffness       all moments are multiplied by another factor from a hold on: a heater was switched on, a strand broke
-length          less of the cable lies between the axes from a hold on: it slid through a bearing
-
-And forces may act that no model has, as they come and go over the steps, from the first or a later one on, as cosines
+Forces may act that no model has, as they come and go over the steps, from the first or a later one on, as cosines
 of order o, normal about nothing, of a standard deviation that falls with 1 / (1 + o):
 
 moments         at one bearing or both: a stop, a cable that is led in
@@ -30,7 +23,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.law import multiplied
+from pipeline.diagnosis.causes.begun import BEGUN, SHARE, Begun, joints, with_rest
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.extension import Term
 from rod.inverse.prediction import Facts, Model
@@ -41,9 +34,6 @@ SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Of the largest force, moment or bend, their standard deviation: steps of a factor 3.3, over which a normal density
 hardly changes, from what is just seen to what is another experiment; the second one is tried first."""
 
-SHARE = 0.25
-"""Of the probability of something else beforehand: of what begins between two holds, and of unknown forces."""
-
 WAVES = {f"{k} half waves": float(k) for k in (1, 2, 3, 4)}
 """Forms of moments along the cable, and the number of their half waves."""
 
@@ -52,81 +42,6 @@ POINTS = {f"{u:.1f}": u for u in (0.1, 0.3, 0.5, 0.7, 0.9)}
 
 ALONG = "along the chord"
 """Setting of forces that act so."""
-
-GROWS = (("as it begins", 0.0), ("growing", 1.0))
-"""Labels of what stays as it begins, and of what grows by as much in every further hold."""
-
-
-class _Begun(Cause):
-    """What is so from one hold on: ``at`` is the index of its step, ``width`` 1 if it grows from then on."""
-
-    seat = "cable"
-
-    def chance(self, variant: Variant, facts: Facts) -> float:
-        """Probability beforehand of one of its forms, given that something else acts."""
-        return SHARE / len(BEGUN) / len(self.variants(facts))
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """From each hold under load on but the first; what grows from there is a drift, at the last it only begins."""
-        since = [Variant(at=float(k), setting=str(k)) for k in facts.pushed[1:]]
-        begins, grows = (
-            [replace(form, label=label, width=width) for form in some]
-            for (label, width), some in zip(GROWS, (since, since[1:-1]), strict=True)
-        )
-        return (*begins, *grows)
-
-    @staticmethod
-    def course(variant: Variant, facts: Facts) -> Array:
-        """Share (steps,) of what has begun."""
-        passed = np.arange(len(facts.branch)) - variant.at
-        return np.where(passed < 0.0, 0.0, 1.0 + variant.width * passed)
-
-
-class OtherRest(_Begun):
-    """Another pre-curvature from a hold on."""
-
-    name = "begun.rest"
-    unit = "1/m"
-
-    def plausible(self, facts: Facts) -> float:
-        """A twentieth of the range of curvatures."""
-        return 0.05 * facts.curvature_scale
-
-    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Add ``amount`` to K0 from the step ``at`` on."""
-        return _with_rest(model, np.outer(amount * self.course(variant, facts), np.ones_like(_joints(model))))
-
-
-class OtherStiffness(_Begun):
-    """Other moments from a hold on."""
-
-    name = "begun.stiffness"
-    unit = "-"
-
-    def plausible(self, facts: Facts) -> float:
-        """A twentieth."""
-        return 0.05
-
-    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Multiply the forces by ``1 + amount`` from the step ``at`` on."""
-        factor = 1.0 + amount * self.course(variant, facts)
-        return model.observed(multiplied(factor, factor[:, None]))
-
-
-class OtherLength(_Begun):
-    """Less cable between the axes from a hold on."""
-
-    name = "begun.length"
-    unit = "m"
-
-    def plausible(self, facts: Facts) -> float:
-        """Two thousandths of the length."""
-        return 2e-3 * facts.length
-
-    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Let ``amount`` slide out from the step ``at`` on; a tenth of the cable is left."""
-        slid = np.minimum(amount * self.course(variant, facts), 0.9 * facts.length).tolist()
-        return replace(model, bending=replace(model.bending, slid=tuple(slid)))
 
 
 class _Unknown(Cause):
@@ -211,8 +126,8 @@ class UnknownBends(_Unknown):
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Move the rest by ``amount`` along a half wave, as its course says."""
-        wave = np.sin(WAVES[variant.label] * np.pi * _joints(model))
-        return _with_rest(model, np.outer(amount * self.course(variant, facts), wave))
+        wave = np.sin(WAVES[variant.label] * np.pi * joints(model))
+        return with_rest(model, np.outer(amount * self.course(variant, facts), wave))
 
 
 class UnknownForces(_Unknown):
@@ -238,7 +153,7 @@ class UnknownForces(_Unknown):
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Push the cable by ``amount``, as its course says."""
-        force = np.outer(amount * self.course(variant, facts), _at(POINTS[variant.label], _joints(model)))
+        force = np.outer(amount * self.course(variant, facts), _at(POINTS[variant.label], joints(model)))
         way = np.array([1.0, 0.0] if variant.setting == ALONG else [0.0, 1.0])
         return _pushed(model, force[:, :, None] * way, model.bending.forces_by_step)
 
@@ -265,9 +180,9 @@ class PlaceOfForce(Cause):
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Let the forces act at ``amount`` (of the length) beyond their place."""
-        forces, joints = model.bending.forces_by_step, _joints(model)
+        forces, places = model.bending.forces_by_step, joints(model)
         whole = np.zeros((1, 2)) if forces is None else forces.sum(axis=1)
-        return _pushed(model, whole[:, None, :] * _at(POINTS[variant.label] + amount, joints)[:, None])
+        return _pushed(model, whole[:, None, :] * _at(POINTS[variant.label] + amount, places)[:, None])
 
 
 def carried_over(terms: Sequence[Term], known: Sequence[Term], amounts: Array, facts: Facts) -> Array:
@@ -286,11 +201,6 @@ def carried_over(terms: Sequence[Term], known: Sequence[Term], amounts: Array, f
     return start
 
 
-def _joints(model: Model) -> Array:
-    """Shares of the length at the joints (n,) of a cable of equal elements."""
-    return np.linspace(0.0, 1.0, int(model.bending.elements) + 1)
-
-
 def _at(u: float, joints: Array) -> Array:
     """A force at a share of the length, divided between the two joints (n,) beside it."""
     inside = min(max(u, joints[1]), joints[-2])
@@ -302,14 +212,6 @@ def _pushed(model: Model, forces: Array, beside: Array | None = None) -> Model:
     return replace(model, bending=replace(model.bending, forces_by_step=forces if beside is None else beside + forces))
 
 
-def _with_rest(model: Model, more: Array) -> Model:
-    """The model whose rest is moved at each step and joint by (steps, n) 1/m."""
-    given = model.bending.grown
-    return replace(model, bending=replace(model.bending, grown=more if given is None else given + more))
-
-
-OTHER_STIFFNESS = OtherStiffness()
-BEGUN = (OtherRest(), OTHER_STIFFNESS, OtherLength())
 PLACE = PlaceOfForce()
 UNKNOWN: tuple[UnknownMoments | UnknownForces | UnknownBends, ...] = (UnknownMoments(), UnknownForces(), UnknownBends())
-UNNAMED: tuple[_Begun | _Unknown | PlaceOfForce, ...] = (*BEGUN, *UNKNOWN, PLACE)
+UNNAMED: tuple[Begun | _Unknown | PlaceOfForce, ...] = (*BEGUN, *UNKNOWN, PLACE)

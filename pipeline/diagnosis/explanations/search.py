@@ -19,8 +19,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.unnamed import (
-    BEGUN,
     SIZES,
     UNKNOWN,
     UnknownBends,

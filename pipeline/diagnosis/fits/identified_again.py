@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.unnamed import OTHER_STIFFNESS
+from pipeline.diagnosis.causes.begun import OTHER_STIFFNESS
 from pipeline.diagnosis.fits.search import suspect
 from rod.inverse.fit import Fit
 from rod.inverse.mean_law import mean_law, mean_posterior, moved_by_forces

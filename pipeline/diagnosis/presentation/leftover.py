@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.diagnosis.causes.unnamed import BEGUN, PLACE, POINTS, UNKNOWN
+from pipeline.diagnosis.causes.begun import BEGUN
+from pipeline.diagnosis.causes.unnamed import PLACE, POINTS, UNKNOWN
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.maps import whereabouts
 from pipeline.diagnosis.fits.workbench import Workbench
