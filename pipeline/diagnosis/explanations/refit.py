@@ -109,7 +109,7 @@ def fit_term(
     best: Fit | None = None
     far = FAR * (len(base.residual) - added.extension.size)
     for start, spare in ((linear_start(observation, added), False), *_elsewhere(added)):
-        if spare and min(hopeless, np.inf if best is None else best.chi2) < far:
+        if spare and hopeless < far:
             continue
         found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
