@@ -11,9 +11,9 @@ does the opposite; one whose layers slip at once changes within little of both. 
     xi = (share of the moment + share of the bend K - K0 + w share of the change of log c) / (2 + w),    w = T / (1 + T)
 
 with T = int |d log c|, nothing of it happens within less than a third of the interval, and a law that hardly changes is
-one over moment and bend. All this is of a law known before (`refreshed`), and of its changes counts what is known of
-them; without one xi is the share of the moment. The law is one of the bend K - K0, so a cable that is set keeps it;
-beyond the moments of its basis the compliance is that of the nearer end.
+one over moment and bend. All this is of a law known before (`refreshed`); without one xi is the share of the moment.
+The law is one of the bend K - K0, so a cable that is set keeps it; beyond the moments of its basis the compliance is
+that of the nearer end.
 
 Units: moments in N m, compliance in 1/(N m^2), curvature in 1/m.
 
@@ -43,9 +43,6 @@ ends within a thirtieth of the range is smeared: 51 instead of 68 % of it lay in
 
 CELLS = 200
 """Of the integral of the compliance."""
-
-KNOWN = 4.0
-"""Standard deviations of a slope of log c of which half counts as known: waves that noise makes are nearly nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,11 +123,11 @@ def moment_basis(low: float, high: float, *, unit: float, size: int = COEFFICIEN
     return _basis(np.array([low, high]), np.array([0.0, 1.0]), lambda m: np.full(m.shape, span), unit=unit, size=size)
 
 
-def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float, *, size: int | None = None) -> LawBasis:
+def refreshed(law: ComplianceLaw, low: float, high: float, *, size: int | None = None) -> LawBasis:
     """Basis over the moments [min(low, 0), max(high, 0)] N m on which a law found before changes evenly along xi.
 
-    ``covariance`` (p, p) says how well it is known: of its changes counts what is. The basis has ``size`` coefficients,
-    or as many as the law.
+    It has ``size`` coefficients, or as many as the law. That waves which noise makes count like any other change costs
+    a smooth law nothing; to count only what is known for certain left knees smeared, and bands beside them too narrow.
     """
     low, high = _with_rest(low, high)
     m = np.sort(np.concatenate([np.linspace(low, high, 2 * CELLS), law.basis.moments]))
@@ -138,7 +135,7 @@ def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float, *,
     m = m[np.append(np.diff(m) > 1e-3 * (high - low) / CELLS, True)]  # rounding puts one moment in two places
     m[0] = low
     bend = law.bend(m)
-    here, between = (law.known_slopes(covariance, at) for at in (m, 0.5 * (m[1:] + m[:-1])))
+    here, between = (np.abs(law.log_slope(at)) for at in (m, 0.5 * (m[1:] + m[:-1])))
     change = np.concatenate([[0.0], np.cumsum(np.diff(m) / 6.0 * (here[1:] + 4.0 * between + here[:-1]))])
     weight = 1.0 / (1.0 + change[-1])
     ranges, total = (high - low, bend[-1] - bend[0]), 2.0 + weight * change[-1]
@@ -147,7 +144,7 @@ def refreshed(law: ComplianceLaw, covariance: Array, low: float, high: float, *,
     m, share = m[rises], share[rises]
 
     def pace(at: Array) -> Array:
-        change = weight * law.known_slopes(covariance, at)
+        change = weight * np.abs(law.log_slope(at))
         return np.asarray(total / (1.0 / ranges[0] + law.compliance(at) / ranges[1] + change))
 
     return _basis(m, share, pace, unit=law.basis.unit, size=size or law.basis.size)
@@ -246,16 +243,6 @@ class ComplianceLaw(LawOfBend):
         # the end of a range counts as inside, rounded as it may be
         outside = np.maximum(b.moments[0] - m, m - b.moments[-1])
         return np.where(outside <= 1e-9 * b.span, slope, 0.0)
-
-    def known_slopes(self, covariance: Array, moment: Array) -> Array:
-        """Size of d log c / dm (n,) 1/(N m) as far as it is known, see `KNOWN`; zero beyond the basis."""
-        b = self.basis
-        by = np.asarray(b.spline(b.place(moment), 1))
-        square, doubt = (by @ self.coefficients) ** 2, KNOWN**2 * np.sum((by @ covariance) * by, axis=1)
-        size = square**1.5 / np.maximum(square + doubt, np.finfo(float).tiny)
-        inside = (moment >= b.moments[0]) & (moment <= b.moments[-1])
-        # between its points the abscissa may swing back where the law is hardly stiff at all
-        return np.where(inside, size * np.abs(b.abscissa(moment, 1)), 0.0)
 
     def bend(self, moment: ArrayLike) -> Array:
         """K - K0 of moments (n,) N m, 1/m."""

@@ -139,8 +139,7 @@ def regress(model: MomentModel, *, pre_curvature: float) -> Regression | None:
         if found is None:
             return None
         met = np.concatenate([d.true_moment(model.errors(found.unknowns)) for d in model.data])
-        known = found.posterior.covariance[: model.size, : model.size]
-        basis = refreshed(found.curve, known, float(met.min()), float(met.max()))
+        basis = refreshed(found.curve, float(met.min()), float(met.max()))
         unknowns = np.concatenate([basis.projected(found.curve), found.unknowns[model.size :]])
         found = _settled(replace(model, basis=basis), unknowns, "all" if laid == LAYINGS - 1 else "rough")
     return found

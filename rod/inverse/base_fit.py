@@ -158,15 +158,14 @@ def laid_along(fitted: Fit, over: Abscissa = "bend") -> tuple[Extension, Array]:
     base, count = fitted.extension.base, fitted.extension.base.law.size
     assert isinstance(base.law, AnyLaw)
     law, visited = law_of(fitted), np.append(fitted.excess, 0.0)
-    rise, known, size = base.law.basis.law(fitted.vector[:count]), fitted.covariance[:count, :count], count
+    rise, size = base.law.basis.law(fitted.vector[:count]), count
     if base.law.over != over:
         size = COEFFICIENTS
         assert isinstance(law, StiffnessLaw)
         rise = over_moments(law, visited)
-        known = np.zeros((rise.basis.size, rise.basis.size))
     if over == "moment":
         visited = law.moment(visited, np.zeros(1))
-    basis = refreshed(rise, known, float(visited.min()), float(visited.max()), size=size)
+    basis = refreshed(rise, float(visited.min()), float(visited.max()), size=size)
     extension = replace(fitted.extension, base=replace(base, law=AnyLaw(basis, over)))
     return extension, np.r_[basis.projected(rise), fitted.vector[count:]]
 

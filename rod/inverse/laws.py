@@ -220,7 +220,7 @@ def as_photographed(
         prior = law.prior()
         found = np.linalg.lstsq(np.vstack([rows, prior]), np.r_[log_f, np.zeros(len(prior))])[0]
         rise = law.basis.law(found)
-        law = AnyLaw(refreshed(rise, SURE**2 * np.eye(law.size), 0.0, float(bend[-1])))
+        law = AnyLaw(refreshed(rise, 0.0, float(bend[-1])))
     return law, law.basis.projected(rise), rest
 
 

@@ -15,7 +15,7 @@ def laws():
     for low, high in ((0.0, 9.0), (-4.0, 9.0)):
         first = moment_basis(low, high, unit=5e-3).law(FALLS)
         yield StiffnessLaw(first)
-        second = refreshed(first, 0.01 * np.eye(COEFFICIENTS), low, high)
+        second = refreshed(first, low, high)
         yield StiffnessLaw(second.law(second.projected(first)))
 
 
