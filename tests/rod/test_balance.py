@@ -198,17 +198,21 @@ def test_what_forces_have_in_common_moves_the_law_as_each_of_them_would():
 
 @pytest.mark.parametrize("mounted", [True, False])
 def test_pre_curvature_growing_along_the_cable(mounted):
-    """Truth by solve_bvp. With a force-free photo the law comes back; without one the halves disagree, and it shows."""
+    """Truth by solve_bvp. With a force-free photo the law comes back; without one the halves disagree, and it shows.
+
+    Of five draws every one must show the profile; f_EI is off by 0.6 % in the median of draws, by 3 % in one of 16.
+    """
     rest = force_free(LAW, LENGTH)
     truth = [bent_by_bvp(LAW, LENGTH, chord, bow=lambda s: 0.8 * (2 * s / LENGTH - 1)) for chord in CHORDS]
     shapes = ([bent_by_bvp(LAW, LENGTH, None, bow=lambda s: 0.8 * (2 * s / LENGTH - 1))] if mounted else []) + truth
-    graph = balance(record(shapes, rest.chord, np.random.default_rng(5))[0])
+    graphs = [balance(record(shapes, rest.chord, np.random.default_rng(seed))[0]) for seed in range(5, 10)]
     if not mounted:
-        assert abs(graph.checks["left_right_z"]) > 6
+        assert min(abs(graph.checks["left_right_z"]) for graph in graphs) > 6
     else:
-        assert graph.checks["uniform_at_rest_p"] < 1e-6
-        assert graph.varying[0] == pytest.approx(0.8, abs=0.05)
-        assert np.sqrt(np.mean((graph.law.tangent / LAW.tangent(graph.law.kappa) - 1) ** 2)) < 0.03
+        assert max(graph.checks["uniform_at_rest_p"] for graph in graphs) < 1e-6
+        assert [graph.varying[0] for graph in graphs] == pytest.approx(5 * [0.8], abs=0.05)
+        off = [np.sqrt(np.mean((graph.law.tangent / LAW.tangent(graph.law.kappa) - 1) ** 2)) for graph in graphs]
+        assert np.median(off) < 0.01
 
 
 def test_bvp_and_quadrature_agree():
