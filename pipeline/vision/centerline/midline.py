@@ -223,7 +223,7 @@ def _between_pairs(keep: NDArray[np.bool_], both: NDArray[np.bool_]) -> NDArray[
 
 
 def _running_median(values: Array) -> Array:
-    return np.asarray(median_filter(values, size=min(_MEDIAN, len(values)), mode="nearest"))
+    return np.asarray(median_filter(values, size=min(_MEDIAN, len(values)), mode="mirror"))
 
 
 def _consistent(
