@@ -158,6 +158,19 @@ def test_a_jaw_that_goes_on_beside_one_edge_is_no_cable(above):
     assert found.s[0] > 140.0 - 4.0  # the jaw ends 140 px along the path, blurred by 1 px
 
 
+@pytest.mark.parametrize("end", ["first", "last"])
+def test_edges_at_the_very_end_are_judged_by_those_beside_them(end):
+    """The shade of a cover's rim moves one edge of the outermost sections by a pixel, the midline by half of that."""
+    ground = strip_picture(highlight=False)
+    ground.grey[37, slice(None, 45) if end == "first" else slice(405, None)] = 0.8
+    noise = 0.01 * np.random.default_rng(0).standard_normal(ground.grey.shape)
+    ground = Closeup((cv2.GaussianBlur(ground.grey, (0, 0), 1.0) + noise).astype(np.float32), (0, 0))
+    s = np.linspace(20.0, 390.0, 240)
+    found = measure_sections(ground, straight(), s, half_width=24.0, diameter=48.0, blur=1.0)
+    middle = 0.5 * (found.first + found.second)[:, 1]
+    assert np.abs(middle - np.median(middle)).max() < 0.15  # scatter of a section is 0.03 px
+
+
 def test_sections_beside_the_picture_or_under_a_cover_are_left_out():
     s = np.linspace(0.0, 400.0, 401)
     inside = in_picture(strip_picture(), straight(v=20.0), s, 25.0)
