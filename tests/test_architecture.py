@@ -111,7 +111,7 @@ INSIDE = {
     ],
     "pipeline.vision.bearings": [("rim",), ("rings", "cut"), ("covers",), ("cover_size", "steady")],
     "pipeline.vision.centerline": [
-        ("curvature", "smoothing", "slow_light", "ground_waves"),
+        ("curvature", "smoothing", "ground_waves"),
         ("edge_profile",),
         ("curve_fit", "edges", "axes_of_series"),
         ("midline", "continuation"),

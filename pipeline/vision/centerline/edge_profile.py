@@ -21,7 +21,6 @@ from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
 from pipeline.records import Array
-from pipeline.vision.centerline.slow_light import steadied
 from pipeline.vision.median import MAD_TO_STD, SURE_SIGMAS, median, medians, quantile
 
 Float32 = NDArray[np.float32]
@@ -340,7 +339,5 @@ def fit_edges(
     # What hides the cable has no edge, but noise has a step wherever it is sought, half of them upward: on paper that
     # hid 12 diameters, edges of noise along the search's straight bridge moved the midline by 30 px.
     faint = step < SURE_SIGMAS * np.sqrt(covariance[:, 1, 1])
-    found = np.where((weight.sum(axis=1) < _LEAST_PIXEL_SHARE * count) | faint, np.nan, place).reshape(shape)
-    light, errors = np.stack([level, step], axis=1).reshape(*shape, 2), covariance.reshape(*shape, 3, 3)
-    steady, std = steadied(found, light, errors, s)
-    return Edges(steady, std, step.reshape(shape))
+    found = np.where((weight.sum(axis=1) < _LEAST_PIXEL_SHARE * count) | faint, np.nan, place)
+    return Edges(found.reshape(shape), np.sqrt(covariance[:, 2, 2]).reshape(shape), step.reshape(shape))

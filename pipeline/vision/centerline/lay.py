@@ -20,11 +20,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicSpline
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 
-from pipeline.records import Rejected
+from pipeline.records import Array, Rejected
 from pipeline.vision.centerline.measurement import Followed
 from pipeline.vision.median import median
-
-Array = NDArray[np.float64]
 
 _LONGEST_WIDTHS, _ORDER = 5.6, 4
 """Widths; waves this long are halved: of one four widths long, the lay of a twisted pair, a sixteenth is left alone, of

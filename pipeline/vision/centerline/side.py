@@ -12,12 +12,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.records import Centerline, Finding, Rejected, inferred, said_once
 from rod.measurement import MeasuredShape
-
-Array = NDArray[np.float64]
 
 _OTHER_SIDE_WIDTHS = 0.5  # widths; a bow that anyone sees: a smaller one to the other side is a straight cable
 
