@@ -44,7 +44,7 @@ class Frame:
     values, integrals : (2 G + 1, J)
         Splines and their integrals from the anchor.
     penalty : (d, J)
-        Root of the penalty: ``|penalty @ c|^2 = int (d^k kappa / ds^k)^2 ds``, k its ``order``.
+        Root of the penalty: ``|penalty @ c|^2 = int (d^k kappa / ds^k)^2 ds``, k as `PENALTY_ORDER`.
     """
 
     knots: Array
@@ -53,7 +53,6 @@ class Frame:
     values: Array
     integrals: Array
     penalty: Array
-    order: int
 
     @cached_property
     def turns(self) -> Array:
@@ -66,7 +65,7 @@ class Frame:
         return int(self.values.shape[1]) + 2
 
 
-def make_frame(length: float, *, intervals: int, order: int = PENALTY_ORDER) -> Frame:
+def make_frame(length: float, *, intervals: int) -> Frame:
     """Even knots from 0 to ``length``.
 
     Raises
@@ -76,20 +75,19 @@ def make_frame(length: float, *, intervals: int, order: int = PENALTY_ORDER) -> 
     """
     if intervals < 4 or not length > 0.0:
         raise ValueError("a curvature spline needs a length and at least 4 intervals")
-    unit = _unit_frame(intervals, order)
+    unit = _unit_frame(intervals)
     return Frame(
         knots=length * unit.knots,
         grid=length * unit.grid,
         anchor=unit.anchor,
         values=unit.values,
         integrals=length * unit.integrals,
-        penalty=length ** (0.5 - order) * unit.penalty,
-        order=order,
+        penalty=length ** (0.5 - PENALTY_ORDER) * unit.penalty,
     )
 
 
 @cache
-def _unit_frame(intervals: int, order: int) -> Frame:
+def _unit_frame(intervals: int) -> Frame:
     """Even knots from 0 to 1: the same for all photos, whatever the length of the cable on them."""
     edges = np.linspace(0.0, 1.0, intervals + 1)
     knots = np.r_[[0.0] * DEGREE, edges, [1.0] * DEGREE]
@@ -99,14 +97,14 @@ def _unit_frame(intervals: int, order: int) -> Frame:
     grid[::2], grid[1::2] = nodes, 0.5 * (nodes[1:] + nodes[:-1])
     anchor = 2 * (len(nodes) // 2)
     integral = spline.antiderivative()(grid)
-    return Frame(knots, grid, anchor, spline(grid), integral - integral[anchor], _penalty(spline, edges, order), order)
+    return Frame(knots, grid, anchor, spline(grid), integral - integral[anchor], _penalty(spline, edges))
 
 
-def _penalty(spline: BSpline, edges: Array, order: int) -> Array:
-    abscissae, weights = np.polynomial.legendre.leggauss(max(1, DEGREE + 1 - order))  # exact for the square
+def _penalty(spline: BSpline, edges: Array) -> Array:
+    abscissae, weights = np.polynomial.legendre.leggauss(DEGREE + 1 - PENALTY_ORDER)  # exact for the square
     half = 0.5 * np.diff(edges)
     at = (0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * abscissae).ravel()
-    return np.asarray(np.sqrt(np.outer(half, weights)).ravel()[:, None] * spline(at, nu=order))
+    return np.asarray(np.sqrt(np.outer(half, weights)).ravel()[:, None] * spline(at, nu=PENALTY_ORDER))
 
 
 class _Nodes(NamedTuple):

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.records import Array
-from pipeline.vision.centerline.curvature import Frame, PlaneCurve
+from pipeline.vision.centerline.curvature import PENALTY_ORDER, Frame, PlaneCurve
 from pipeline.vision.centerline.smoothing import Problem, Smooth
 from pipeline.vision.median import median, scatter
 from rod.measurement import slow_covariance
@@ -149,10 +149,10 @@ def _linear(curve: PlaneCurve, s: Array, residual: Array, std: Array, weight: Ar
         design=normal,
         data=residual[used] + normal[:, 2:] @ curve.coefficients,
         penalty=curve.frame.penalty,
-        null=2 + curve.frame.order,
+        null=2 + PENALTY_ORDER,
         std=std[used] / np.sqrt(weight[used]),
         position=s[used],
-        least=rms_of_bow(curve, curve.frame.order) ** 2 * float(np.ptp(curve.frame.knots)),
+        least=rms_of_bow(curve, PENALTY_ORDER) ** 2 * float(np.ptp(curve.frame.knots)),
     )
 
 
