@@ -101,7 +101,6 @@ def weigh(
     std: float,
     share: float = 1.0,
     crossed: tuple[float, float] | None = None,
-    grid: float = 1.0,
     known: bool = False,
 ) -> Evidence:
     """The evidence for a strip.
@@ -122,8 +121,6 @@ def weigh(
         Of the length asked for, on which widths were found.
     crossed : (u, v) px or None
         Where something leaves the strip.
-    grid : px
-        Distance of values of the picture that tell something new.
     known : bool
         That the cable is so wide: no flank of it passes then, and above half of the usual step an edge is likelier
         there than not, however faint it is.
@@ -148,7 +145,7 @@ def weigh(
         length=length,
         seen=float(np.mean(weaker > (min(SURE_SIGMAS, 0.5 * edges) if known else SURE_SIGMAS))) * share,
         edges=edges,
-        unsteady=_unsteady(widths, width, std, grid),
+        unsteady=_unsteady(widths, width, std),
         crossed=crossed,
     )
 
@@ -162,10 +159,10 @@ def _steps(blocks: Array, offset: Array, places: Array, reach: int) -> Array:
     return np.asarray((right - left) * np.sign(places))
 
 
-def _unsteady(widths: Array, width: float, std: float, grid: float) -> float:
+def _unsteady(widths: Array, width: float, std: float) -> float:
     along = _wave(widths)
     calm = np.convolve(widths, np.ones(along) / along, mode="valid") if len(widths) > along else widths
-    return scatter(calm) / max(_CALM_PX * grid, _CALM * width, 1.5 * std)
+    return scatter(calm) / max(_CALM_PX, _CALM * width, 1.5 * std)
 
 
 def _wave(widths: Array) -> int:

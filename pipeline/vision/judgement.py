@@ -130,10 +130,10 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     first, last = found.visible
     path = found.path_px[first : last + 1]
     # a cell's edge is found to a fifth of it
-    std, grid = 0.3 * standout.reduction, photo.grid_px
+    std = 0.3 * standout.reduction
     across = path_normals(path)[1]
     known = cable.diameter_px is not None
-    evidence = weigh(found.closeup, path, across, widths, std=std, share=share, crossed=crossed, grid=grid, known=known)
+    evidence = weigh(found.closeup, path, across, widths, std=std, share=share, crossed=crossed, known=known)
     return replace(found, goes_on=more is not None, evidence=evidence, findings=told)
 
 
@@ -213,7 +213,6 @@ def _assemble(
         dark=cut.dark,
         contrast=cut.contrast,
         weights=tuple(float(weight) for weight in cut.weights),
-        grid_px=photo.grid_px,
         findings=tuple(_hidden_end(axis, cable) for axis in axes if axis.kind == "clamp"),
     )
 

@@ -39,8 +39,6 @@ class Photo:
         Grey, or blue, green, red.
     bit_depth : int
         Bits that are used: 8, 10, 12, 14 or 16.
-    grid_px : float
-        Distance of values that tell something new: cameras and JPEG keep colour at half the resolution of brightness.
     taken : Photo or None
         The photo in all its colours, where this is one of them alone.
     """
@@ -48,7 +46,6 @@ class Photo:
     name: str
     pixels: Pixels
     bit_depth: int
-    grid_px: float = 1.0
     taken: Photo | None = None
 
     @property

@@ -80,8 +80,6 @@ class RoughCable:
         Median step between ground and cable, positive.
     weights : tuple of float
         Colour projection: weight of each channel as stored (one for grey photos).
-    grid_px : float
-        Of the photo that ``grey`` is of; see `pipeline.vision.photo.Photo`.
     findings : tuple of Finding
     goes_on : bool
         The cable seems to go on beyond an end of it.
@@ -100,7 +98,6 @@ class RoughCable:
     dark: bool
     contrast: float
     weights: tuple[float, ...] = (1.0,)
-    grid_px: float = 1.0
     findings: tuple[Finding, ...] = ()
     goes_on: bool = False
     evidence: Evidence = field(default_factory=Evidence)

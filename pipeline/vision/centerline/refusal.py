@@ -33,7 +33,7 @@ missed by 0.06 at most.
 def evidence_of(rough: RoughCable, sections: Sections, *, known: bool = False) -> Evidence:
     """How much what was measured looks like a cable."""
     line, std = _middle_across(sections), 2.0 * median(sections.std)
-    return weigh(rough.closeup, *line, sections.width, std=std, share=sections.share, grid=rough.grid_px, known=known)
+    return weigh(rough.closeup, *line, sections.width, std=std, share=sections.share, known=known)
 
 
 def _middle_across(sections: Sections) -> tuple[Array, Array]:

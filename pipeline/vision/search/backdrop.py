@@ -38,7 +38,6 @@ _AROUND = np.ones((9, 9), np.uint8)  # cells
 _SHADE_COSINE, _DARKEST_SHADE = 0.97, 0.5  # of the ground's colour; a lamp leaves half of the light in a shadow
 ROWS = 128  # px; worked on at a time: large photos shall not be held as single precision
 _LEAST_CABLE = 0.25  # of what stands out; with less, its colours are those of shadow or of other things
-_COLOUR_GRID_PX = 2.0  # px; of a Bayer filter, and of JPEG with 4:2:0
 
 
 @dataclass(frozen=True)
@@ -212,4 +211,4 @@ def _along(photo: Photo, core: Array, ground: Array) -> Photo:
     grey = np.empty(photo.pixels.shape[:2], np.uint16)
     for rows in (slice(first, first + ROWS) for first in range(0, len(grey), ROWS)):
         grey[rows] = np.rint(cv2.transform(photo.pixels[rows].astype(np.float32), scaled) - 65535.0 * darkest)
-    return Photo(photo.name, grey, 16, _COLOUR_GRID_PX, photo)
+    return Photo(photo.name, grey, 16, photo)
