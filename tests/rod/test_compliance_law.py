@@ -18,6 +18,7 @@ STEEP = 2.0 * np.tanh((np.arange(COEFFICIENTS) - 12) / 2.0) + RIPPLE * RNG.norma
 
 AT = np.asarray(splines(COEFFICIENTS)(np.linspace(0.0, 1.0, 400)))
 
+
 def laws():
     for low, high in ((0.0, 0.05), (-0.02, 0.05), (-0.03, 0.0)):
         first = moment_basis(low, high, unit=60.0).law(STEEP)
