@@ -36,56 +36,43 @@ from pipeline.settings import ReportSettings
 
 
 def report_html(result: Result, settings: ReportSettings | None = None) -> str:
-    """Text of ``report.html``.
-
-    Parameters
-    ----------
-    result : Result
-        Measured, partly measured or failed.
-    settings : ReportSettings, optional
-    """
+    """Text of ``report.html`` of a result, measured, partly measured or failed."""
     settings = settings or ReportSettings()
     words = Words.of(settings)
     main, diagnosis = main_figure(result, words), diagnosis_view(result, words)
     levels = {level: [f for f in result.findings if f.level == level] for level in ("error", "warning", "info")}
-    return (
-        environment()
-        .get_template("report.html")
-        .render(
-            result=result,
-            words=words,
-            answer=first_screen(result, words),
-            main=main,
-            aside=_aside(result, words),
-            map_note=map_note(result, words),
-            shown={
-                "photos": bool(result.photos) or result.status != "failed",
-                "diagnosis": diagnosis is not None and diagnosis.examined,
-            },
-            pointer=pointer_data(result, main, words),
-            levels=levels,
-            photos=photo_views(result, words),
-            photos_note=photos_note(result, words),
-            figures=mechanics_figures(result, words),
-            diagnosis=diagnosis,
-            tables={
-                "forces": force_rows(result, words),
-                "photos": photo_rows(result, words),
-                "knots": knot_rows(result, words),
-            },
-            simulated=any(step.force_fit_N is not None for step in result.steps),
-            knots_title=knot_title(result, words),
-            force_symbol=force_unit(result, words).symbol,
-            stiffness_symbol=stiffness_unit(result, words).symbol,
-            use=simulation_texts(result, words, settings),
-            specimen_rows=specimen_rows(result, words),
-            fit_rows=fit_rows(result, words),
-            nuisance_rows=nuisance_rows(result, words),
-            provenance=provenance_rows(result, words),
-            palette=palette_css(page_colours()),
-            css=asset("page.css") + asset("report.css"),
-            js=asset("page.js") + asset("report.js"),
-        )
+    rows = {"forces": force_rows, "photos": photo_rows, "knots": knot_rows}
+    page = environment().get_template("report.html")
+    return page.render(
+        result=result,
+        words=words,
+        answer=first_screen(result, words),
+        main=main,
+        aside=_aside(result, words),
+        map_note=map_note(result, words),
+        shown={
+            "photos": bool(result.photos) or result.status != "failed",
+            "diagnosis": diagnosis is not None and diagnosis.examined,
+        },
+        pointer=pointer_data(result, main, words),
+        levels=levels,
+        photos=photo_views(result, words),
+        photos_note=photos_note(result, words),
+        figures=mechanics_figures(result, words),
+        diagnosis=diagnosis,
+        tables={name: of(result, words) for name, of in rows.items()},
+        simulated=any(step.force_fit_N is not None for step in result.steps),
+        knots_title=knot_title(result, words),
+        force_symbol=force_unit(result, words).symbol,
+        stiffness_symbol=stiffness_unit(result, words).symbol,
+        use=simulation_texts(result, words, settings),
+        specimen_rows=specimen_rows(result, words),
+        fit_rows=fit_rows(result, words),
+        nuisance_rows=nuisance_rows(result, words),
+        provenance=provenance_rows(result, words),
+        palette=palette_css(page_colours()),
+        css=asset("page.css") + asset("report.css"),
+        js=asset("page.js") + asset("report.js"),
     )
 
 

@@ -37,7 +37,6 @@ def beam_table(curve: Visited, *, both_sides: bool | None = None) -> pd.DataFram
 
     Parameters
     ----------
-    curve : Visited
     both_sides : bool, optional
         Whether to add the other side, taken to be alike; by default where the cable is straight at rest, because then
         nothing tells one side from the other.
@@ -77,7 +76,6 @@ def export(result: Result, form: str, *, bounds: tuple[float, float] | None = No
 
     Parameters
     ----------
-    result : Result
     form : str
         One of `FORMATS`.
     bounds : (low, high) in 1/m, optional
@@ -108,25 +106,22 @@ def export(result: Result, form: str, *, bounds: tuple[float, float] | None = No
         f"K0 = {rounded(curve.pre_curvature, curve.pre_curvature_std)} 1/m, the curvature at rest",
     )
     table, inertia = beam_table(curve, both_sides=True), np.pi * diameter**4 / 64.0
-    return (
-        _engine()
-        .get_template(f"export.{form}")
-        .render(
-            head=[_one_line(line) for line in head],
-            not_measured=NOT_MEASURED,
-            other_side=OTHER_SIDE,
-            curve=list(zip(table.bend_per_m, table.moment_Nm, strict=True)),
-            nodes=_arc(length, curve.pre_curvature),
-            elements=ELEMENTS,
-            length=length,
-            radius=diameter / 2.0,
-            area=np.pi * diameter**2 / 4.0,
-            inertia=inertia,
-            stiffness=constant.stiffness,
-            modulus=constant.stiffness / inertia,
-            density=DENSITY,
-            K0=curve.pre_curvature,
-        )
+    template = _engine().get_template(f"export.{form}")
+    return template.render(
+        head=[_one_line(line) for line in head],
+        not_measured=NOT_MEASURED,
+        other_side=OTHER_SIDE,
+        curve=list(zip(table.bend_per_m, table.moment_Nm, strict=True)),
+        nodes=_arc(length, curve.pre_curvature),
+        elements=ELEMENTS,
+        length=length,
+        radius=diameter / 2.0,
+        area=np.pi * diameter**2 / 4.0,
+        inertia=inertia,
+        stiffness=constant.stiffness,
+        modulus=constant.stiffness / inertia,
+        density=DENSITY,
+        K0=curve.pre_curvature,
     )
 
 
