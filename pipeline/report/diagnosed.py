@@ -224,11 +224,11 @@ def _before_and_after(before: ResidualMap, after: ResidualMap, words: Words) -> 
 
 def _force_texts(before: ResidualMap, after: ResidualMap, words: Words) -> str:
     """Forces left over by step, before and after, as text."""
-    parts = []
-    for residuals in (before, after):
-        values = residuals.force_sigma
-        parts.append("; ".join(NOTHING if value is None else words.number(value, 2) for value in values))
-    return " → ".join(part for part in parts if part)
+    parts = (
+        "; ".join(NOTHING if value is None else words.number(value, 2) for value in residuals.force_sigma)
+        for residuals in (before, after)
+    )
+    return " → ".join(filter(None, parts))
 
 
 def _closest(twins: dict[str, dict[str, float]], words: Words) -> str:

@@ -108,8 +108,8 @@ def mechanics_figures(result: Result, words: Words) -> dict[str, Drawing]:
         drawn["moment"] = titled("moment", partial(figures.draw_moment, **how), words)
     tops = [r[1] for r in map(seen_range, result.photos) if r]
     if tops:
-        draw, top = partial(figures.draw_curvatures, result=result, words=words), words.curvature(max(tops))
-        drawn["curvatures"] = titled("curvatures", draw, words, top=top)
+        top = words.curvature(max(tops))
+        drawn["curvatures"] = titled("curvatures", partial(figures.draw_curvatures, **how), words, top=top)
     if len(figures.fitted_branches(result)) > 1:
         drawn["branches"] = titled("branches", partial(figures.draw_branches, **how), words)
     if result.balance and result.balance.pointwise and result.balance.curve:

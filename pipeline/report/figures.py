@@ -65,15 +65,8 @@ def draw_characteristic(figure: Area, result: Result, words: Words) -> Axes:
             _banded(axes, curve, unit, words, front=1.0 if method == answering else 0.0)
     if result.inverse and "inverse" in parts and "inverse" not in aside:
         knots = [k for k in result.inverse.knots if low <= k.kappa_per_m <= high]
-        axes.plot(
-            [k.kappa_per_m for k in knots],
-            [unit.factor * k.tangent_Nm2 for k in knots],
-            ls="none",
-            marker="o",
-            ms=4.5,
-            mfc=LIGHT["paper"],
-            mec=LIGHT["inverse"],
-        )
+        places, values = [k.kappa_per_m for k in knots], [unit.factor * k.tangent_Nm2 for k in knots]
+        axes.plot(places, values, ls="none", marker="o", ms=4.5, mfc=LIGHT["paper"], mec=LIGHT["inverse"])
     axes.set_xlim(left, high + margin)
     _limit(axes, counted, unit, words)
     _over_kappa(axes, "axis_stiffness", unit, words)
@@ -137,18 +130,10 @@ def draw_moment(figure: Area, result: Result, words: Words) -> Axes:
     axes, parts = plot_area(figure), trusted(result)
     unit = words.unit("N m", *(v for curve in _drawn(result) for v in curve.moment))
     if result.balance and result.balance.points_kappa_per_m:
-        count = len(result.balance.points_kappa_per_m)
-        chosen = slice(None, None, max(1, count // 300))  # more points than that only fill the picture
-        axes.plot(
-            result.balance.points_kappa_per_m[chosen],
-            [unit.factor * m for m in result.balance.points_moment_Nm[chosen]],
-            ls="none",
-            marker=".",
-            ms=3.0,
-            color=LIGHT["muted"],
-            alpha=0.7,
-            label=words("points_balance"),
-        )
+        places, moments = result.balance.points_kappa_per_m, result.balance.points_moment_Nm
+        chosen = slice(None, None, max(1, len(places) // 300))  # more points than that only fill the picture
+        dots: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.0, "color": LIGHT["muted"], "alpha": 0.7}
+        axes.plot(places[chosen], [unit.factor * m for m in moments[chosen]], label=words("points_balance"), **dots)
     for method, curve in parts.items():
         if method in set_aside(result):
             _faint(axes, curve.kappa, unit.factor * curve.moment, method, words)
@@ -237,18 +222,11 @@ def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, colour: str, word
     loading = [step for step in ordered if step.branch != "unloading"]
     turning = loading[-1:] if len(loading) < len(ordered) else []
     unloading = [step for step in ordered if step.branch == "unloading" or step in turning]
+    look: dict[str, Any] = {"color": colour, "marker": "_", "ms": 14.0, "mew": 2.0, "lw": 0.8}
     for line, dash, label in ((loading, "-", words("simulated")), (unloading, (0, (4, 2)), None)):
-        axes.plot(
-            [1e3 * step.displacement_m for step in line],
-            [unit.factor * (step.force_fit_N or 0.0) for step in line],
-            color=colour,
-            marker="_",
-            ms=14.0,
-            mew=2.0,
-            lw=0.8,
-            ls=dash,
-            label=label,
-        )
+        places = [1e3 * step.displacement_m for step in line]
+        forces = [unit.factor * (step.force_fit_N or 0.0) for step in line]
+        axes.plot(places, forces, ls=dash, label=label, **look)
 
 
 def _force_rest(rest: Axes, by_branch: dict[str, list[StepPart]], words: Words) -> None:

@@ -40,12 +40,8 @@ def measured_map(result: Result) -> ResidualMap | None:
         for table, values in zip(rows.values(), (sigma, left), strict=True):
             row = np.interp(grid, photo.s_m, values, left=np.nan, right=np.nan)
             table.append([float(v) if np.isfinite(v) else None for v in row])
-    return ResidualMap(
-        s_m=grid.tolist(),
-        steps=[p.step for p in photos],
-        branches=[branches.get(p.step, "") for p in photos],
-        **rows,
-    )
+    steps = [p.step for p in photos]
+    return ResidualMap(s_m=grid.tolist(), steps=steps, branches=[branches.get(s, "") for s in steps], **rows)
 
 
 def extended_map(result: Result) -> ResidualMap | None:

@@ -27,9 +27,8 @@ def draw_shapes(experiment: TableOne, words: Words, figure: Area) -> Axes:
     initial = experiment.initial
     axes.plot(1e3 * initial.x, 1e3 * initial.y, color=LIGHT["muted"], ls=":", label=words("paper_initial"))
     for number, (step, colour) in enumerate(zip(experiment.steps, step_colours(3), strict=True), start=1):
-        axes.plot(
-            1e3 * step.x, 1e3 * step.y, color=colour, label=f"{words('step')} {number}: {words.fixed(step.force, 4)} N"
-        )
+        label = f"{words('step')} {number}: {words.fixed(step.force, 4)} N"
+        axes.plot(1e3 * step.x, 1e3 * step.y, color=colour, label=label)
     axes.set_aspect("equal", adjustable="datalim")
     return finish(axes, words, x="x [mm]", y="y [mm]", legend=2)
 
@@ -61,13 +60,7 @@ def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
     for number, (values, colour, mark) in enumerate(zip(forces.T, step_colours(3), "osD", strict=True), start=1):
         axes.plot(count, values, color=colour, marker=mark, ms=4, label=f"{words('step')} {number}")
     axes.hlines(forces[-1], 0, count[-1], color=LIGHT["measured"], lw=1.2, ls=":", label=words("paper_table"))
-    finish(
-        axes,
-        words,
-        x=Ruling(words("paper_count"), whole=True),
-        y=words("axis_force", unit="N"),
-        legend=4,
-    )
+    finish(axes, words, x=Ruling(words("paper_count"), whole=True), y=words("axis_force", unit="N"), legend=4)
     bends = plot_area(below, top=ONE_ROW)
     s = 1e3 * fit.steps[-1].s
     _iterations(bends, s, [state.steps[-1].kappa for state in fit.history], words)
@@ -77,12 +70,11 @@ def draw_responses(fit: PaperFit, words: Words, figure: Area) -> Axes:
 
 def draw_straight(forces_alone: PaperFit, fit: PaperFit, free: PaperFit, words: Words, figure: Area) -> Axes:
     """Fig. 6: fits with K0 = 0 by the forces alone (above) and with the curvatures (below), beside that of free K0."""
-    for part, forced, name in zip(
-        _halves(figure), (forces_alone, fit), (words("paper_by_forces"), words("paper_by_both")), strict=True
-    ):
+    named = ((forces_alone, "paper_by_forces"), (fit, "paper_by_both"))
+    for part, (forced, name) in zip(_halves(figure), named, strict=True):
         axes = plot_area(part)
         axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
-        axes.plot(KAPPA, 1e3 * forced.characteristic.f(KAPPA), color=LIGHT["alarm"], label=name)
+        axes.plot(KAPPA, 1e3 * forced.characteristic.f(KAPPA), color=LIGHT["alarm"], label=words(name))
         axes.plot(KAPPA, 1e3 * free.characteristic.f(KAPPA), color=LIGHT["inverse"], ls="--", label=words("paper_free"))
         _truth(axes, words)
         finish(axes, words, x=words("axis_kappa"), y=STIFFNESS, legend=2)

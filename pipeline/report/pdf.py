@@ -53,14 +53,8 @@ class Sheet:
         """Write a paragraph over the width of the page."""
         for line in _lines(text, size, bold):
             self.y += LEADING * size
-            self.figure.text(
-                MARGIN / PAGE[0],
-                1.0 - self.y / PAGE[1],
-                line,
-                size=size,
-                weight="bold" if bold else "normal",
-                color=color,
-            )
+            x, y, weight = MARGIN / PAGE[0], 1.0 - self.y / PAGE[1], "bold" if bold else "normal"
+            self.figure.text(x, y, line, size=size, weight=weight, color=color)
         self.y += 0.4 * size
 
     def pairs(self, rows: list[tuple[str, str]], *, size: float) -> None:
@@ -105,13 +99,8 @@ def pdf_bytes(result: Result, settings: ReportSettings | None = None) -> bytes:
             sheets.append(_diagnosis_sheet(result, result.diagnosis, view, words))
         sheets.append(_photo_sheet(result, words, settings))
         file = io.BytesIO()
-        metadata = {
-            "CreationDate": None,
-            "Producer": None,
-            "Creator": "cablebend",
-            "Title": words("title", id=result.specimen.id),
-        }
-        with PdfPages(file, metadata=metadata) as pages:
+        metadata = {"Creator": "cablebend", "Title": words("title", id=result.specimen.id)}
+        with PdfPages(file, metadata={**metadata, "CreationDate": None, "Producer": None}) as pages:
             for number, sheet in enumerate(sheets, start=1):
                 place = words("page_of", page=number, pages=len(sheets))
                 sheet.figure.text(0.5, 20.0 / PAGE[1], place, size=8.0, ha="center", color=LIGHT["muted"])

@@ -24,13 +24,7 @@ PICTURE_HEAD = 18.0
 
 
 def overlay_paths(photo: PhotoPart) -> tuple[str, str]:
-    """SVG paths of the seen and the extended centerline, in px of the preview.
-
-    Returns
-    -------
-    seen, extended : str
-        Values of the attribute ``d``; empty where there is nothing to draw.
-    """
+    """SVG paths (attribute ``d``) of the seen and the extended centerline in px of the preview; empty without any."""
     if photo.preview is None or not photo.u_px:
         return "", ""
     u = (np.asarray(photo.u_px) + 0.5) / photo.preview.reduction
@@ -86,8 +80,7 @@ def draw_photo_curvature(figure: Area, photo: PhotoPart, words: Words) -> Axes:
     kappa, half = np.asarray(photo.kappa_per_m), words.half_band * np.asarray(photo.kappa_std_per_m)
     axes.fill_between(s, kappa - half, kappa + half, color=LIGHT["measured"], alpha=0.18, lw=0.0)
     axes.plot(s, kappa, color=LIGHT["measured"], lw=1.6, label=words("measured"))
-    if photo.kappa_fit_per_m:
-        fit = photo.kappa_fit_per_m
+    if fit := photo.kappa_fit_per_m:
         axes.plot(s, fit, color=LIGHT["inverse"], ls=(0, (5, 2)), lw=1.6, label=words("simulated"))
     seen = np.asarray(photo.seen, dtype=bool)
     if seen.any():  # under a cover the band widens without bound; what is seen decides the scale
@@ -110,8 +103,7 @@ def _residual(figure: Area, photo: PhotoPart, s: np.ndarray, words: Words) -> No
     axes.axhline(0.0, color=LIGHT["muted"], lw=0.8)
     axes.plot(s, unit.factor * np.asarray(photo.shape_residual_m), color=LIGHT["measured"], lw=1.2)
     _along_the_cable(axes, s, np.asarray(photo.seen, dtype=bool))
-    left_over = Ruling(words("axis_residual", unit=unit.symbol), most=4)
-    finish(axes, words, x=words("axis_s"), y=left_over)
+    finish(axes, words, x=words("axis_s"), y=Ruling(words("axis_residual", unit=unit.symbol), most=4))
 
 
 def _along_the_cable(axes: Axes, s: np.ndarray, seen: np.ndarray) -> None:

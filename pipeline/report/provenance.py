@@ -71,12 +71,9 @@ def fit_rows(result: Result, words: Words) -> list[tuple[str, str]]:
         misfit, force = part.misfit, force_unit(result, words)
         length = words.unit("m", misfit.shape_rmse_m)
         dof = misfit.degrees_of_freedom
+        expected = words("expected", std=words.number((2.0 * dof) ** 0.5, 2))
         rows += [
-            (
-                words("fit_chi2"),
-                f"{words.number(misfit.chi2, 4)} / {words.number(dof, 4)} "
-                f"({words('expected', std=words.number((2.0 * dof) ** 0.5, 2))})",
-            ),
+            (words("fit_chi2"), f"{words.number(misfit.chi2, 4)} / {words.number(dof, 4)} ({expected})"),
             (words("fit_rmse"), f"{force.plain(misfit.force_rmse_N)}, {length.plain(misfit.shape_rmse_m)}"),
         ]
     return rows

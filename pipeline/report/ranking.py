@@ -48,7 +48,7 @@ def draw_ranking(figure: Area, diagnosis: DiagnosisPart, words: Words) -> Axes:
     pull.barh(places, [row.z for row in rows], color=colours, height=0.62)
     shifts = [100.0 * (row.stiffness_shift or 0.0) for row in rows]
     impact.barh(places, shifts, color=colours, height=0.62)
-    limit = max(2.0 * NOISE, *(1.1 * abs(row.z) for row in rows)) if rows else 2.0 * NOISE
+    limit = max([2.0 * NOISE, *(1.1 * abs(row.z) for row in rows)])
     pull.set_xlim(-limit, limit)
     reach = max([1.0, *(1.1 * abs(shift) for shift in shifts)])
     impact.set_xlim(-reach, reach)
