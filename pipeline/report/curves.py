@@ -39,18 +39,9 @@ class Equivalent:
 
 
 def equivalent(curve: Visited | RowCurve, bounds: tuple[float, float] | None = None) -> Equivalent | None:
-    """Equivalent constant stiffness over a range of curvature.
+    """Equivalent constant stiffness over a range of curvature; None if it was not visited.
 
-    Parameters
-    ----------
-    curve : Visited or RowCurve
-    bounds : (low, high) in 1/m, optional
-        Cut to the visited range; the whole of it by default.
-
-    Returns
-    -------
-    Equivalent or None
-        None if the range was not visited.
+    ``bounds`` (low, high) in 1/m are cut to the visited range; the whole of it by default.
     """
     low, high = bounds or (curve.kappa[0], curve.kappa[-1])
     low, high = max(low, float(curve.kappa[0])), min(high, float(curve.kappa[-1]))
@@ -82,13 +73,11 @@ def seen_range(photo: PhotoPart) -> tuple[float, float] | None:
 
 def smallest_radius(result: Result) -> tuple[float, float, int] | None:
     """Smallest bend radius seen on any photo and its standard deviation in m, and the step."""
-    sharpest: tuple[float, float, int] | None = None
-    for photo in result.photos:
-        seen = np.flatnonzero(photo.seen)
-        if not seen.size:
-            continue
-        index = int(seen[np.argmax(np.abs(np.asarray(photo.kappa_per_m)[seen]))])
-        kappa, std = abs(photo.kappa_per_m[index]), photo.kappa_std_per_m[index]
-        if kappa > 0.0 and (sharpest is None or 1.0 / kappa < sharpest[0]):
-            sharpest = (1.0 / kappa, std / kappa**2, photo.step)
-    return sharpest
+    seen = [
+        (abs(kappa), std, photo.step)
+        for photo in result.photos
+        for kappa, std, shown in zip(photo.kappa_per_m, photo.kappa_std_per_m, photo.seen, strict=True)
+        if shown
+    ]
+    kappa, std, step = max(seen, key=lambda bend: bend[0], default=(0.0, 0.0, 0))
+    return (1.0 / kappa, std / kappa**2, step) if kappa > 0.0 else None

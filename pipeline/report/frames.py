@@ -14,14 +14,8 @@ from pipeline.report.exports import BEAM, beam_table
 from pipeline.result import Curve, Result
 
 CHARACTERISTIC = (
-    "kappa_per_m",
-    "moment_Nm",
-    "tangent_Nm2",
-    "tangent_std_Nm2",
-    "secant_Nm2",
-    "supported",
-    "moment_std_Nm",
-    "secant_std_Nm2",
+    *("kappa_per_m", "moment_Nm", "tangent_Nm2", "tangent_std_Nm2", "secant_Nm2", "supported"),
+    *("moment_std_Nm", "secant_std_Nm2"),
 )
 CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m")
 
@@ -36,13 +30,11 @@ def characteristic_frame(result: Result) -> pd.DataFrame:
         "balance": result.balance.curve if result.balance else None,
         "extended": result.diagnosis.extended if result.diagnosis else None,
     }
-    parts, chosen = [], result.answer.method
+    parts = []
     for method, curve in whole.items():
         if curve is not None:
-            part = pd.DataFrame({name: getattr(curve, name) for name in CHARACTERISTIC})
-            part.insert(0, "method", method)
-            part.insert(1, "answer", int(method == chosen))
-            parts.append(part)
+            columns = {name: getattr(curve, name) for name in CHARACTERISTIC}
+            parts.append(pd.DataFrame({"method": method, "answer": int(method == result.answer.method)} | columns))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["method", "answer", *CHARACTERISTIC])
 
 
@@ -78,17 +70,9 @@ def causes_frame(result: Result) -> pd.DataFrame:
 def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) -> pd.DataFrame:
     """Constants a simulation program asks for: equivalent EI over a range of curvature, K0, smallest radius, causes.
 
-    Parameters
-    ----------
-    result : Result
-    bounds : (low, high) in 1/m, optional
-        Range of the equivalent stiffness; the whole visited range by default.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns quantity, value, std, unit, note; each quantity once. A cause that was named stands under its name.
-        No rows where the numbers are not usable.
+    Columns quantity, value, std, unit, note; each quantity once. A cause that was named stands under its name. No rows
+    where the numbers are not usable. ``bounds`` (low, high) in 1/m of the equivalent stiffness are by default those of
+    the visited range.
     """
     rows: list[tuple[str, float, float | None, str, str]] = []
     columns = ["quantity", "value", "std", "unit", "note"]

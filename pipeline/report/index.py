@@ -202,10 +202,7 @@ def _data(rows: list[IndexRow], pooled: list[Repeats], unit: Unit, words: Words)
         "words": {name: words(f"index_{name}") for name in ("shown", "select")}
         | {name: words(name) for name in ("shape_alt", "pooled_single", "pooled_mean", "pooled_scatter")},
         "states": {state: words(f"status_{state}") for state in (*STATUSES, "unusable")},
-        "verdicts": {
-            verdict: "–" if verdict == "none" else words(f"verdict_{verdict}")
-            for verdict in sorted(set(map(_verdict, rows)))
-        },
+        "verdicts": {v: "–" if v == "none" else words(f"verdict_{v}") for v in sorted(set(map(_verdict, rows)))},
         "pooled": [_figure(entry, unit) for entry in pooled if entry.alt],
     }
     yield _json(whole)[:-1] + ',"cells":'

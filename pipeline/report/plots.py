@@ -26,18 +26,14 @@ DOTS_PER_INCH = 144
 def plot_characteristic(result: Result, *, settings: ReportSettings | None = None) -> Figure:
     """Draw f_EI over the curvature by every way, with bands; raises ``ValueError`` where nothing was measured.
 
-    Parameters
-    ----------
-    result : Result
-    settings : ReportSettings, optional
-        Language and width of the bands.
+    The settings give the language and the width of the bands.
     """
     words = _words(settings, None if curves(result) else Message("misuse.no-curve", name=result.specimen.id))
     return _figure(lambda area: figures.draw_characteristic(area, result, words), (420.0, 310.0))
 
 
 def plot_forces(result: Result, *, settings: ReportSettings | None = None) -> Figure:
-    """Draw measured and simulated forces over the displacement; parameters as `plot_characteristic`."""
+    """Draw measured and simulated forces over the displacement; settings as in `plot_characteristic`."""
     words = _words(settings, None if result.steps else Message("misuse.no-forces", name=result.specimen.id))
     return _figure(lambda area: figures.draw_forces(area, result, words), (400.0, 350.0))
 

@@ -72,10 +72,7 @@ class Pooled:
 def pool(specimens: Sequence[RowCurve]) -> Pooled | None:
     """Pool the characteristics of repeat specimens.
 
-    Returns
-    -------
-    Pooled or None
-        None for fewer than two specimens, no common range, or errors that are not positive.
+    None for fewer than two specimens, no common range, or errors that are not positive.
     """
     if len(specimens) < 2:
         return None
@@ -86,9 +83,8 @@ def pool(specimens: Sequence[RowCurve]) -> Pooled | None:
     errors = np.array([np.interp(kappa, c.kappa, c.tangent_std) for c in specimens])
     if len(known) < len(specimens) or not np.all(errors > 0.0):
         return None
-    curve, curve_std, scatter, _ = random_effects(
-        np.array([np.interp(kappa, c.kappa, c.tangent) for c in specimens]), errors
-    )
+    tangents = np.array([np.interp(kappa, c.kappa, c.tangent) for c in specimens])
+    curve, curve_std, scatter, _ = random_effects(tangents, errors)
     return Pooled(kappa, curve, curve_std, scatter, scattered([(c.stiffness, c.std) for c in known]))
 
 

@@ -23,13 +23,7 @@ def write_result(result: Result, folder: Path) -> Path:
 
 
 def write_tables(result: Result, folder: Path, settings: ReportSettings | None = None) -> tuple[Path, ...]:
-    """Write the tables of a result into a folder; a failed specimen gets tables with heads only.
-
-    Returns
-    -------
-    tuple of Path
-        characteristic.csv, centerlines.csv, beam_table.csv, simulation.csv.
-    """
+    """Write the tables of a result into a folder; a failed specimen gets tables with heads only."""
     bounds = (settings or ReportSettings()).equivalent_range_per_m
     frames = {
         "characteristic.csv": characteristic_frame(result),
