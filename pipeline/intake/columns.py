@@ -87,24 +87,10 @@ class Columns:
 
 
 def find_columns(text: str, spec: LogSpec) -> tuple[Columns, Rows]:
-    """Find the separator, the header and the meaning of the columns.
+    """Find separator, header and meaning of the columns of a log, and all its rows that are not blank.
 
-    Parameters
-    ----------
-    text : str
-        The whole log.
-    spec : LogSpec
-        What the user says; it wins over everything found.
-
-    Returns
-    -------
-    Columns, Rows
-        And all rows that are not blank.
-
-    Raises
-    ------
-    InputError
-        ``log/empty``, ``log/no-header``, ``log/no-column``, ``log/ambiguous-column``, ``log/unit``.
+    What the user says (``spec``) wins over everything found. Raises `InputError` ``log/empty``, ``log/no-header``,
+    ``log/no-column``, ``log/ambiguous-column``, ``log/unit``.
     """
     separators = (spec.separator,) if spec.separator else SEPARATORS
     heads = {separator: head_rows(text, separator, HEAD) for separator in separators}

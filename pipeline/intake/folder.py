@@ -47,10 +47,7 @@ def find_specimens(paths: Iterable[Path], settings: IntakeSettings) -> list[Path
         _check_folder(path)
         here = folders_of_kind("specimen", [path], settings)
         if not here:
-            other = misnamed(path)
-            if other is not None:
-                raise other
-            raise InputError(Message("folder/no-specimen"), path=path)
+            raise misnamed(path) or InputError(Message("folder/no-specimen"), path=path)
         found.update(dict.fromkeys(here))
     return list(found)
 
@@ -138,18 +135,7 @@ def _folders_in(folder: Path) -> list[str]:
 
 
 def read_specimen(folder: Path, settings: IntakeSettings) -> Specimen:
-    """Read and check a specimen folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Holds ``specimen.toml``.
-    settings : IntakeSettings
-
-    Returns
-    -------
-    Specimen
-        In SI units, with the steps of the force log, the photos that exist, and findings.
+    """Read and check the folder of a ``specimen.toml``: the steps of its force log, its photos, and findings; SI units.
 
     Raises
     ------

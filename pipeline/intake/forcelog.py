@@ -33,20 +33,12 @@ class ForceLog:
 
 
 def read_force_log(path: Path, spec: LogSpec, settings: IntakeSettings, length: float = math.inf) -> ForceLog:
-    """Read a force log.
+    """Read a force log; ``spec`` is what the user says about it in ``specimen.toml``.
 
     Parameters
     ----------
-    path : Path
-    spec : LogSpec
-        What the user says about it in ``specimen.toml``.
-    settings : IntakeSettings
     length : m
         Of the cable. No displacement is larger, which tells a fraction from a thousand where nothing else does.
-
-    Returns
-    -------
-    ForceLog
 
     Raises
     ------

@@ -56,7 +56,6 @@ def hold_forces(holds: Sequence[Hold], *, resolution: float, settings: IntakeSet
         In the order of the log; each with at least one sample.
     resolution : float
         N, value of the last digit of the log.
-    settings : IntakeSettings
 
     Returns
     -------
@@ -65,9 +64,8 @@ def hold_forces(holds: Sequence[Hold], *, resolution: float, settings: IntakeSet
         largest force (``force_std_relative``) stands in.
     """
     largest = max(float(np.max(np.abs(hold.forces))) for hold in holds)
-    floor = max(
-        resolution / math.sqrt(12.0), 1e-9 * largest, 1e-12
-    )  # the last two: a log of zeros or of endless digits
+    # the last two: a log of zeros or of endless digits
+    floor = max(resolution / math.sqrt(12.0), 1e-9 * largest, 1e-12)
     degree = _degree(holds)
     fits = [_Fit.of(hold, degree) for hold in holds]
     freedom = sum(fit.freedom for fit in fits)

@@ -52,12 +52,7 @@ def list_photos(folder: Path, *, without: Path | None, settings: IntakeSettings)
 
     Raises `InputError` ``folder/too-many-photos``.
     """
-    names = [
-        str(PurePosixPath(place) / entry)
-        for place in _places(folder, settings, without)
-        for entry in _entries(folder / place)
-        if _is_photo(entry)
-    ]
+    names = [str(name) for name in _files(folder, without, settings) if _is_photo(name.name)]
     if len(names) > settings.photos_max:
         raise InputError(Message("folder/too-many-photos", photos=len(names), limit=settings.photos_max), path=folder)
     return tuple(sorted(names, key=natural_key))
@@ -81,6 +76,12 @@ def _named(folder: Path, settings: IntakeSettings) -> list[str]:
     """Folders named after photos that do not lead out of the specimen's."""
     named = [entry for entry in _entries(folder) if entry.casefold() in FOLDERS]
     return [place for place in named if inside(folder, place, allow_outside=settings.allow_outside) is not None]
+
+
+def _files(folder: Path, without: Path | None, settings: IntakeSettings) -> list[PurePosixPath]:
+    """Names, relative to the folder, of everything where photos may lie."""
+    places = _places(folder, settings, without)
+    return [PurePosixPath(place) / entry for place in places for entry in _entries(folder / place)]
 
 
 def _places(folder: Path, settings: IntakeSettings, without: Path | None) -> list[str]:
@@ -107,12 +108,7 @@ def _places(folder: Path, settings: IntakeSettings, without: Path | None) -> lis
 
 def _of_other_kinds(folder: Path, without: Path | None, settings: IntakeSettings) -> list[str]:
     """Pictures of kinds that are not read, and of which no photo of the same name is there."""
-    names = [
-        PurePosixPath(place) / entry
-        for place in _places(folder, settings, without)
-        for entry in _entries(folder / place)
-        if not NO_PHOTO.search(entry)
-    ]
+    names = [name for name in _files(folder, without, settings) if not NO_PHOTO.search(name.name)]
     read = {name.with_suffix("") for name in names if _is_photo(name.name)}
     other = [name for name in names if name.suffix.casefold() in OTHER_SUFFIXES and name.with_suffix("") not in read]
     return sorted(map(str, other), key=natural_key)

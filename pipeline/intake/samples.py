@@ -84,19 +84,10 @@ class Samples:
 
 
 def read_samples(rows: Rows, columns: Columns, spec: LogSpec, *, length: float) -> tuple[Samples, Columns]:
-    """Convert the rows below the header; ``length`` (m) of the cable is farther than it was pushed.
+    """Samples in the rows below the header, and the columns with the units that stand in the cells.
 
-    Returns
-    -------
-    Samples
-    Columns
-        With the units that stand in the cells.
-
-    Raises
-    ------
-    InputError
-        ``log/empty``, ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``,
-        ``log/unit``.
+    The ``length`` (m) of the cable is farther than it was pushed. Raises `InputError` ``log/empty``,
+    ``log/row-length``, ``log/ambiguous-decimal``, ``log/not-a-number``, ``log/branch``, ``log/unit``.
     """
     read = read_table(rows, columns)
     lines = read.lines

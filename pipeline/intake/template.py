@@ -56,17 +56,9 @@ moving_bearing = "left"     # or "right"
 
 
 def write_template(folder: Path, settings: IntakeSettings) -> Path:
-    """Write a commented ``specimen.toml`` into a folder.
+    """Write a commented ``specimen.toml`` into a folder; its path.
 
-    Returns
-    -------
-    Path
-        The file written.
-
-    Raises
-    ------
-    InputError
-        ``init/exists`` if there is one already, ``folder/missing``, ``folder/no-photos``.
+    Raises `InputError` ``init/exists`` if there is one already, ``folder/missing``, ``folder/no-photos``.
     """
     path = folder / NAME
     if not folder.is_dir():
