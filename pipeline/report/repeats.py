@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.messages import Message
 from pipeline.report.page import unbroken
 from pipeline.report.pooling import Pooled, Scatter, outlying, pool, scattered
 from pipeline.report.words import Words
-from pipeline.result import none_of_its_type
 from pipeline.result.row import IndexRow, RowCurve
 from pipeline.units import Unit
 
@@ -67,7 +67,7 @@ def without_outlying(rows: list[IndexRow]) -> list[IndexRow]:
             if not wrong:
                 continue
             times = mean / float(np.median(means[means != mean]))
-            fault = none_of_its_type(times, others=len(group) - 1, kind=name)
+            fault = Message("fault.none-of-its-type", times=times, others=len(group) - 1, type=name)
             judged[number] = replace(rows[number], usable=False, fault=fault, outlying=True)
     return judged
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 from pipeline.result.answer import Answer as Answer
 from pipeline.result.answer import curves as curves
 from pipeline.result.answer import leading as leading
-from pipeline.result.answer import none_of_its_type as none_of_its_type
 from pipeline.result.answer import set_aside as set_aside
 from pipeline.result.answer import trusted as trusted
 from pipeline.result.diagnosed import BlindSpot as BlindSpot

@@ -173,8 +173,3 @@ def data_fault(result: Result, curve: Visited | None) -> Message | None:
     told = next((finding.said for finding in result.findings if finding.code in wrong), None)
     negative = curve is not None and float(np.mean(curve.tangent)) <= 0.0  # the cable would help to bend itself
     return told or (Message("fault.negative") if negative else None)
-
-
-def none_of_its_type(times: float, *, others: int, kind: str) -> Message:
-    """Why a specimen is not usable whose f_EI is so many times that of most others of its type."""
-    return Message("fault.none-of-its-type", times=times, others=others, type=kind)

@@ -9,13 +9,10 @@ from pydantic import ValidationError
 
 from pipeline.errors import InputError
 from pipeline.messages import Message, by_system
-from pipeline.result.diagnosed import CauseForm
 from pipeline.result.whole import SCHEMA, Result
 
 LARGEST_BYTES = 256_000_000
 """Of a ``result.json``: a photo takes 150 kB, and a test has tens of steps."""
-
-
 FAMILY = "cablebend/result/"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -32,13 +29,9 @@ def from_json(text: str) -> Result:
         raise ValueError("it names no schema")
     for cause in [] if result.diagnosis is None else result.diagnosis.causes:
         if cause.name == "plastic_set":
-            cause.forms[:] = [_set_without_number(form) for form in cause.forms]
+            # ``at`` once was the number of the form, which the label says, and is how soon the set slows down
+            cause.forms[:] = [f if "at" in f.tuned else f.model_copy(update={"at": 0.0}) for f in cause.forms]
     return result
-
-
-def _set_without_number(form: CauseForm) -> CauseForm:
-    """The form of a plastic set; ``at`` once was its number, which the label says, and is how soon it slows down."""
-    return form if "at" in form.tuned else form.model_copy(update={"at": 0.0})
 
 
 def read_result(path: Path | str) -> Result:
