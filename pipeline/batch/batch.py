@@ -71,17 +71,13 @@ def run_batch(
     on_stage: Callable[[str, str], None] = lambda name, stage: None,
     stages: Stages | None = None,
 ) -> Tally:
-    """Measure many specimen folders into a folder of results.
+    """Measure many specimen folders into a folder of results, which is made if needed.
 
     What is there already and depends on the same inputs, settings and program is kept; the index covers everything in
     the folder. Ctrl-C ends the batch, keeps what is finished and still writes the index.
 
     Parameters
     ----------
-    folders : sequence of Path
-        Specimen folders.
-    out : Path
-        Folder of the results; made if needed.
     scheduler : str, optional
         Address of a dask scheduler.
     options : str
@@ -196,8 +192,6 @@ def measure_all(
     ----------
     scheduler : str, optional
         Address of a running dask scheduler whose workers see the same files; else processes of this machine.
-    stages : Stages
-        What is done with a specimen, see `specimen`.
     doing : callable
         Told the name of a result and the stage that begins.
 

@@ -47,14 +47,7 @@ def make_orders(folders: Sequence[Path], out: Path, settings: Settings, *, optio
 
     The command in a result names the specimen from anywhere, and no folder of results: the same bytes go into any.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        Specimen folders, see `pipeline.intake.folder.find_specimens`.
-    out : Path
-        Folder of the results.
-    options : str
-        Options of the command line that change results, for the command each result gives to reproduce it.
+    ``options`` are those of the command line that change results, for the command each result gives to reproduce it.
     """
     version = code_version()
     where = out.absolute()

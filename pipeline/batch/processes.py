@@ -79,7 +79,6 @@ def in_processes(
     ----------
     work : callable
         Takes an item and a callable to be told the stage that begins; never raises. What it gives is no str.
-    items : sequence
     settings : BatchSettings
         Number of processes, and their memory.
     lost : callable
@@ -87,7 +86,6 @@ def in_processes(
         over) and when that began (s, `time.monotonic`).
     attempts : int
         Times that an item whose process died is tried again.
-    interrupted : Event
     doing_now : callable
         Told the item and the stage that begins.
 

@@ -98,8 +98,6 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True, doing: 
 
     Parameters
     ----------
-    order : Order
-    stages : Stages
     guarded : bool
         Note attempts and end the process when the time is over: in a worker of its own only.
     doing : callable
@@ -110,12 +108,12 @@ def measure_order(order: Order, stages: Stages, *, guarded: bool = True, doing: 
         refused = _earlier_attempts(store, order, timeout_s) if guarded else None
         if refused is not None:
             outcome = store_failure(order, [refused])
-        elif guarded:
-            with deadline(timeout_s, store.overdue(order.name).touch):
-                outcome = _measured(store, order, stages, doing)
-            store.end(order.name)
         else:
-            outcome = _measured(store, order, stages, doing)
+            limit = deadline(timeout_s, store.overdue(order.name).touch) if guarded else contextlib.nullcontext()
+            with limit:
+                outcome = _measured(store, order, stages, doing)
+            if guarded:
+                store.end(order.name)
     except Exception as error:  # the one place: whatever breaks on a specimen is its finding and never costs the batch
         trace = None if isinstance(error, InputError) else traceback.format_exc()
         outcome = store_failure(order, refusals(error), trace=trace)
