@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 @click.command(cls=Spoken)
 @click.option("--length-mm", default=181.0, show_default=True, type=POSITIVE)
-@click.option("--ei-rest", default=0.018, show_default=True, type=POSITIVE)
-@click.option("--ei-far", default=0.008, show_default=True, type=POSITIVE)
-@click.option("--kc", default=4.5, show_default=True, type=POSITIVE)
-@click.option("--k0", default=2.0, show_default=True)
+@click.option("--ei-rest", "stiffness", default=0.018, show_default=True, type=POSITIVE)
+@click.option("--ei-far", "stiffness_bent", default=0.008, show_default=True, type=POSITIVE)
+@click.option("--kc", "transition", default=4.5, show_default=True, type=POSITIVE)
+@click.option("--k0", "pre_curvature", default=2.0, show_default=True)
 @click.option("--steps", default=3, show_default=True, type=click.IntRange(1, 100))
 @click.option("--step-mm", default=4.6, show_default=True, type=POSITIVE)
 @click.option("--mounted/--no-mounted", default=True, show_default=True)
@@ -33,32 +33,15 @@ if TYPE_CHECKING:
 @click.option("--samples", default=8, show_default=True, type=click.IntRange(1))
 @click.option("--json", "as_json", is_flag=True)
 @settings_options
-def design(
-    length_mm: float,
-    ei_rest: float,
-    ei_far: float,
-    kc: float,
-    k0: float,
-    steps: int,
-    step_mm: float,
-    as_json: bool,
-    **plan: Any,
-) -> None:
+def design(length_mm: float, steps: int, step_mm: float, as_json: bool, **plan: Any) -> None:
     """Say what a planned test will know of f_EI, which causes it would show, and which stay invisible."""
     from pipeline.diagnosis.plans.design import Plan
     from pipeline.diagnosis.plans.design import design as outlook
 
     settings = chosen_settings()
     try:
-        planned = Plan(
-            length=length_mm * 1e-3,
-            stiffness=ei_rest,
-            stiffness_bent=ei_far,
-            transition=kc,
-            pre_curvature=k0,
-            displacements=tuple(step_mm * 1e-3 * number for number in range(1, steps + 1)),
-            **plan,
-        )
+        displacements = tuple(step_mm * 1e-3 * number for number in range(1, steps + 1))
+        planned = Plan(length=length_mm * 1e-3, displacements=displacements, **plan)
         found = outlook(planned, settings.diagnosis)
     except ValueError as error:
         raise click.UsageError(complaint(error)) from error
