@@ -106,7 +106,7 @@ def find_columns(text: str, spec: LogSpec) -> tuple[Columns, Rows]:
         rows = max(heads.values(), key=lambda rows: len(rows[0][1]))
         # the columns may stand apart by what is no separator here
         apart = len(rows[0][1]) == 1 and re.search(r"\S(?:\s{2,}|\s*\|\s*)\S", rows[0][1][0])
-        told = Message("log/no-header.apart" if apart else "log/no-header", first=column_names(rows))
+        told = Message("log/no-header.apart" if apart else "log/no-header", first=column_names(rows[0][1]))
         raise InputError(told, line=rows[0][0])
     _, row, separator = best
     whole = Rows.of(text, separator)
@@ -166,7 +166,7 @@ def _columns(rows: Rows, row: int, spec: LogSpec) -> Columns:
     places = _roles(header, spec)
     for role in ("force", "displacement"):
         if role not in places:
-            raise InputError(Message("log/no-column", role=role, names=column_names([rows[row]])), line=line)
+            raise InputError(Message("log/no-column", role=role, names=column_names(header)), line=line)
     for role, where in places.items():
         if len(where) > 1:
             names = [header[place] for place in where]

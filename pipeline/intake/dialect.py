@@ -256,7 +256,7 @@ def decimals(cell: str, decimal: Decimal) -> int:
     return len(mantissa[0].partition(decimal)[2].strip()) - shift
 
 
-def column_names(rows: Sequence[Row]) -> str:
+def column_names(cells: Sequence[str]) -> str:
     """The cells of a row for a message: at most ten, in quotes."""
-    names = [shown(cell) for cell in rows[0][1] if cell][:10] if rows else []
+    names = [shown(cell) for cell in cells if cell][:10]
     return ", ".join(names) or "–"

@@ -68,10 +68,9 @@ def hold_places(holds: Sequence[Array], at_photo: Sequence[NDArray[np.bool_]]) -
         return HoldPlaces(tuple(own), (None,) * len(own), 0.0)
     sigma = middle / (MEDIAN_OF_NORMAL * math.sqrt(2.0))
     still = _stand_still(holds, sigma)
-    found = [
-        _place(hold, photo, one, sigma, still=still) for hold, photo, one in zip(holds, at_photo, own, strict=True)
-    ]
-    return HoldPlaces(tuple(place for place, _ in found), tuple(std for _, std in found), sigma)
+    found = (_place(*hold, sigma, still=still) for hold in zip(holds, at_photo, own, strict=True))
+    place, std = zip(*found, strict=True)
+    return HoldPlaces(place, std, sigma)
 
 
 def _stand_still(holds: Sequence[Array], sigma: float) -> bool:
