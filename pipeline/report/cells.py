@@ -13,7 +13,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
-FLOATS = "%.9g"
 
 
 def neutral(cell: object) -> object:
@@ -25,7 +24,7 @@ def neutral(cell: object) -> object:
 
 
 def _number(value: float) -> str:
-    return "" if math.isnan(value) else FLOATS % value
+    return "" if math.isnan(value) else f"{value:.9g}"
 
 
 def csv_lines(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:

@@ -88,15 +88,10 @@ def simulation_texts(result: Result, words: Words, settings: ReportSettings) -> 
     curve = result.answer.curve
     if curve is not None and not result.answer.usable:
         return texts
-    constant = equivalent(curve, settings.equivalent_range_per_m) if curve else None
-    if curve is not None and constant is not None:
-        unit = stiffness_unit(result, words)
-        texts["equivalent"] = words(
-            "use_equivalent_row",
-            value=unit.text(constant.stiffness, constant.std),
-            low=words.curvature(constant.low),
-            high=words.curvature(constant.high),
-        )
+    if curve is not None and (constant := equivalent(curve, settings.equivalent_range_per_m)):
+        value = stiffness_unit(result, words).text(constant.stiffness, constant.std)
+        low, high = words.curvature(constant.low), words.curvature(constant.high)
+        texts["equivalent"] = words("use_equivalent_row", value=value, low=low, high=high)
         texts["bound"] = words("use_bound") if constant.bound else ""
         texts["departure"] = words("use_departure", departure=words.number(100.0 * constant.departure, 2))
         texts["method"] = curve.method

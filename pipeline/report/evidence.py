@@ -45,15 +45,10 @@ def main_figure(result: Result, words: Words) -> Drawing | None:
     if not parts:
         return None
     unit = figures.stiffness_unit(result, words)
-    lines = [
-        words(
-            "fig_line_alt",
-            way=words(f"way_{method}"),
-            first=unit.text(curve.tangent[0], curve.tangent_std[0]),
-            last=unit.text(curve.tangent[-1], curve.tangent_std[-1]),
-        )
-        for method, curve in parts.items()
-    ]
+    lines = []
+    for method, curve in parts.items():
+        first, last = (unit.text(curve.tangent[end], curve.tangent_std[end]) for end in (0, -1))
+        lines.append(words("fig_line_alt", way=words(f"way_{method}"), first=first, last=last))
     read = " ".join(Said(line, words.language).sentence for line in lines)
     low, high = min(c.kappa[0] for c in parts.values()), max(c.kappa[-1] for c in parts.values())
     draw = partial(figures.draw_characteristic, result=result, words=words)
@@ -122,13 +117,9 @@ def mechanics_figures(result: Result, words: Words) -> dict[str, Drawing]:
 
 def residual_map(name: str, residuals: ResidualMap, words: Words, *, title: str = "fig_map") -> Drawing:
     """The figure of a residual map, high enough for its steps."""
-    return drawing(
-        name,
-        partial(maps.draw_map, residuals=residuals, words=words),
-        size=(400.0, maps.map_height(residuals)),
-        title=words(title),
-        description=words("fig_map_alt", rms=map_rms(residuals, words)),
-    )
+    draw, size = partial(maps.draw_map, residuals=residuals, words=words), (400.0, maps.map_height(residuals))
+    told = words("fig_map_alt", rms=map_rms(residuals, words))
+    return drawing(name, draw, size=size, title=words(title), description=told)
 
 
 def map_note(result: Result, words: Words) -> str:

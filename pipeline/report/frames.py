@@ -79,12 +79,11 @@ def simulation_frame(result: Result, bounds: tuple[float, float] | None = None) 
     curve = result.answer.curve
     if curve is not None and not result.answer.usable:
         return pd.DataFrame(columns=columns)
-    constant = equivalent(curve, bounds) if curve else None
-    if curve is not None and constant is not None:
-        note = f"{curve.method}, kappa {constant.low:.6g} to {constant.high:.6g} 1/m"
-        note += ", std is an upper bound" if constant.bound else ""
-        rows.append(("equivalent_stiffness", constant.stiffness, constant.std, "N m2", note))
     if curve is not None:
+        if constant := equivalent(curve, bounds):
+            note = f"{curve.method}, kappa {constant.low:.6g} to {constant.high:.6g} 1/m"
+            note += ", std is an upper bound" if constant.bound else ""
+            rows.append(("equivalent_stiffness", constant.stiffness, constant.std, "N m2", note))
         rows.append(("pre_curvature", curve.pre_curvature, curve.pre_curvature_std, "1/m", curve.method))
     radius = smallest_radius(result)
     if radius is not None:

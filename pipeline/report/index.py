@@ -97,11 +97,8 @@ def _as_entered(path: Path, entered: float) -> bool:
 
 def unreadable(name: str, why: Message) -> Result:
     """A failed result in the place of a ``result.json`` that cannot be read."""
-    return Result(
-        status="failed",
-        specimen=SpecimenPart(id=name, folder=name, moving_bearing=""),
-        findings=[FindingPart.of("error", Message("result/unreadable.index", name=name, why=why))],
-    )
+    finding = FindingPart.of("error", Message("result/unreadable.index", name=name, why=why))
+    return Result(status="failed", specimen=SpecimenPart(id=name, folder=name), findings=[finding])
 
 
 def report_of(result: Result, folder: str, out: Path, settings: ReportSettings) -> str:

@@ -101,7 +101,7 @@ def numbers(paper: Paper) -> dict[str, Any]:
         "table1": table,
         "inverse": {
             "iterations": paper.inverse.iterations,
-            "iterations_to_1e-3": iterations_to(paper.inverse, REACHED),
+            "iterations_to_1e-3": iterations_to_convergence(paper.inverse),
             "ordinates_Nm2": paper.inverse.characteristic.ordinates.tolist(),
             "pre_curvature_per_m": paper.inverse.pre_curvature,
             "history": [
@@ -132,11 +132,11 @@ def force_errors(paper: Paper) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.array([forced.force - free.force for forced, free in both])
 
 
-def iterations_to(fit: PaperFit, relative: float) -> int | None:
-    """First iteration from which on all parameters are within a relative error of Table 1; None if never."""
+def iterations_to_convergence(fit: PaperFit) -> int | None:
+    """First iteration from which on all parameters are within `REACHED` of Table 1; None if never."""
     truth = np.array([*TABLE_1_ORDINATES, TABLE_1["pre_curvature"]])
     errors = [np.max(np.abs(np.array([*s.ordinates, s.pre_curvature]) / truth - 1.0)) for s in fit.history]
-    beyond = [i for i, error in enumerate(errors) if error > relative]
+    beyond = [i for i, error in enumerate(errors) if error > REACHED]
     first = beyond[-1] + 1 if beyond else 0
     return first if first < len(errors) else None
 
@@ -151,11 +151,10 @@ def statements(paper: Paper, words: Words) -> list[tuple[str, ...]]:
     counts = [Message("paper.count", step=step, **asdict(cost)) for step, cost in enumerate(paper.iteration, start=1)]
     shares = [Message("paper.share", cause=_named(cause), share=cause.share, rms=cause.rms) for cause in causes]
     conditions = {"varying_per_m": VARYING, "noise_m": POSITION_NOISE, "window_m": WINDOW}
-    reached = iterations_to(inverse, REACHED)
     said = (
         Message("paper.table", **forces),
         Message("paper.needs", found=[_found(discovery) for discovery in paper.discoveries]),
-        Message("paper.converged", reached=reached, rest=inverse.iterations),
+        Message("paper.converged", reached=iterations_to_convergence(inverse), rest=inverse.iterations),
         Message("paper.straight", stiffness=words.fixed(1e3 * low, 2), nodes=paper.straight.steps[0].kappa.size),
         Message("paper.forces", off=off, largest=largest),
         Message("paper.ways", shares=shares, together=together.rms, **conditions),

@@ -218,14 +218,9 @@ def _photo_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
         sheet.text(words("more_photos", count=len(pictures) - len(shown)), size=8.5)
     sheet.text(words("nav_data"), size=13.0, bold=True)
     source = provenance_rows(result, words)
-    rows = [
-        *specimen_rows(result, words),
-        *fit_rows(result, words),
-        (words("reproduce"), source["command"]),
-        *source["facts"],
-    ]
-    rows += [(name, digest[:16]) for name, digest in source["inputs"]]
-    sheet.pairs(rows, size=8.0)
+    rows = [*specimen_rows(result, words), *fit_rows(result, words), (words("reproduce"), source["command"])]
+    digests = [(name, digest[:16]) for name, digest in source["inputs"]]
+    sheet.pairs([*rows, *source["facts"], *digests], size=8.0)
     return sheet
 
 

@@ -51,10 +51,8 @@ class Visited:
 
     def at(self, kappa: float) -> tuple[float, float]:
         """Tangent and its standard deviation at a curvature, in N m^2, interpolated linearly."""
-        return (
-            float(np.interp(kappa, self.kappa, self.tangent)),
-            float(np.interp(kappa, self.kappa, self.tangent_std)),
-        )
+        value, std = (float(np.interp(kappa, self.kappa, along)) for along in (self.tangent, self.tangent_std))
+        return value, std
 
     @property
     def known(self) -> bool:
