@@ -10,6 +10,7 @@ from pipeline.cli.options import language_option
 from pipeline.cli.speech import complaint, note
 from pipeline.cli.spoken import Spoken
 
+MISSING = 3
 NAMES = ("table", "abaqus", "calculix", "mujoco", "pyelastica")
 
 
@@ -30,7 +31,7 @@ def export(ctx: click.Context, result: Path, form: str, bounds: tuple[float, flo
         text = exported(read_result(result), form, bounds=bounds)
     except ValueError as error:
         note(complaint(error))
-        ctx.exit(3)
+        ctx.exit(MISSING)
     if out is None:
         click.echo(text, nl=False)
     else:

@@ -20,9 +20,20 @@ from pipeline.threads import one_thread
 
 # command -> module of this room; each module has a function of the command's name
 COMMANDS = (
-    *("run", "check", "init", "report", "predict", "compare"),
-    *("export", "demo", "simulate", "design", "explain", "paper"),
+    "run",
+    "check",
+    "init",
+    "report",
+    "predict",
+    "compare",
+    "export",
+    "demo",
+    "simulate",
+    "design",
+    "explain",
+    "paper",
 )
+INTERRUPTED = 130
 
 
 class Commands(Spoken, click.Group):
@@ -53,7 +64,7 @@ class Commands(Spoken, click.Group):
             ctx.exit(2)
         except KeyboardInterrupt:
             note(Message("cli.interrupted"))
-            ctx.exit(130)
+            ctx.exit(INTERRUPTED)
         except OSError as error:
             if error.filename is None:  # a closed pipe, not a place the user named
                 raise

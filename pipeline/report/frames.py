@@ -14,8 +14,14 @@ from pipeline.report.exports import BEAM, beam_table
 from pipeline.result import Curve, Result
 
 CHARACTERISTIC = (
-    *("kappa_per_m", "moment_Nm", "tangent_Nm2", "tangent_std_Nm2", "secant_Nm2", "supported"),
-    *("moment_std_Nm", "secant_std_Nm2"),
+    "kappa_per_m",
+    "moment_Nm",
+    "tangent_Nm2",
+    "tangent_std_Nm2",
+    "secant_Nm2",
+    "supported",
+    "moment_std_Nm",
+    "secant_std_Nm2",
 )
 CENTERLINE = ("s_m", "x_m", "y_m", "u_px", "v_px", "theta_rad", "kappa_per_m", "kappa_std_per_m")
 
