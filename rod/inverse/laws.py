@@ -169,9 +169,6 @@ class FewPoints:
         return 0.0, np.zeros(self.size)
 
 
-LAYINGS = 2
-"""Times that the abscissa of a start is laid along its law."""
-
 BINS = 40
 """Of the moments that photos show: each holds the curvatures of some dozens of sections."""
 
@@ -213,14 +210,13 @@ def as_photographed(
     bend, m = bend[rises], np.append(0.0, m)[rises]
     if not (slope > 0.0 and bend.size > 3 and np.all(np.diff(m) > 0.0)):
         return None
-    law = AnyLaw(moment_basis(0.0, float(bend[-1]), unit=unit, size=COEFFICIENTS))
-    for _ in range(LAYINGS):
-        rows = law.basis.at(0.5 * (bend[1:] + bend[:-1])) / SURE
-        log_f = np.log(np.diff(m) / np.diff(bend) / unit) / SURE
-        prior = law.prior()
-        found = np.linalg.lstsq(np.vstack([rows, prior]), np.r_[log_f, np.zeros(len(prior))])[0]
-        rise = law.basis.law(found)
-        law = AnyLaw(refreshed(rise, 0.0, float(bend[-1])))
+    plain = AnyLaw(moment_basis(0.0, float(bend[-1]), unit=unit, size=COEFFICIENTS))
+    rows = plain.basis.at(0.5 * (bend[1:] + bend[:-1])) / SURE
+    log_f = np.log(np.diff(m) / np.diff(bend) / unit) / SURE
+    prior = plain.prior()
+    found = np.linalg.lstsq(np.vstack([rows, prior]), np.r_[log_f, np.zeros(len(prior))])[0]
+    rise = plain.basis.law(found)
+    law = AnyLaw(refreshed(rise, 0.0, float(bend[-1])))
     return law, law.basis.projected(rise), rest
 
 
