@@ -126,8 +126,8 @@ def moment_basis(low: float, high: float, *, unit: float, size: int = COEFFICIEN
 def refreshed(law: ComplianceLaw, low: float, high: float, *, size: int | None = None) -> LawBasis:
     """Basis over the moments [min(low, 0), max(high, 0)] N m on which a law found before changes evenly along xi.
 
-    It has ``size`` coefficients, or as many as the law. All changes count, however well they are known: waves that noise
-    makes cost a smooth law nothing, and a knee is followed as far as it falls.
+    It has ``size`` coefficients, or as many as the law. All changes count, however well they are known: waves that
+    noise makes cost a smooth law nothing, and a knee is followed as far as it falls.
     """
     low, high = _with_rest(low, high)
     m = np.sort(np.concatenate([np.linspace(low, high, 2 * CELLS), law.basis.moments]))
