@@ -93,6 +93,8 @@ INSIDE = {
         ("judgement",),
         ("by_hand",),
         ("segmentation",),
+        ("series_search", "still_ground"),
+        ("what_moves",),
         ("shots", "single"),
         ("stated_width",),
         ("series",),

@@ -104,6 +104,9 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
         if crossed is not None:  # which of its arms leaves the picture nobody can tell
             return refused_at(photo, "photo/crossing", crossed)
         return _unsharp(photo, standout, cut) or axes if axes.code == "photo/bearing" else axes
+    passed = _passed(standout.to_pixels(strip.path), axes, reading.width * standout.reduction)
+    if passed is not None:
+        return refused_at(photo, "photo/bearing.beside-given", passed.center_px)
     path = _up_to_axes(standout, strip.path, axes, reading.width)
     if path is None:
         return refused(photo, "photo/bearing.nothing")
@@ -135,6 +138,15 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     known = cable.diameter_px is not None
     evidence = weigh(found.closeup, path, across, widths, std=std, share=share, crossed=crossed, known=known)
     return replace(found, goes_on=more is not None, evidence=evidence, findings=told)
+
+
+def _passed(path: Array, axes: tuple[Bearing, Bearing], width: float) -> Bearing | None:
+    """An axis that a person gave and that a path (n, 2) px runs past, more than its width beside: another strip."""
+    for axis in axes:
+        away = np.hypot(*(path - axis.center_px).T)
+        if axis.kind == "given" and width < away.min() < min(away[0], away[-1]) - width:
+            return axis
+    return None
 
 
 def _up_to_axes(standout: Standout, path: Array, axes: tuple[Bearing, Bearing], width: float) -> Array | None:

@@ -139,7 +139,7 @@ def _find_in(photo: Photo, cable: Cable, window: Window | None, near: RoughCable
     if whole is None:
         return found
     seen, again = _found(photo, replace(cable, diameter_px=whole), window, near)
-    if isinstance(again, RoughCable) and _lies_on(again, [found.path_px]) and border_width(seen, again) is None:
+    if isinstance(again, RoughCable) and lies_on(again, [found.path_px]) and border_width(seen, again) is None:
         return again
     return refused(photo, "photo/width.part", width_px=2.0 * found.half_width_px, whole_px=whole)
 
@@ -237,7 +237,7 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
             return refusal
         if refusal.code == "photo/crossing" and _is_piece(best) and beyond < 0.5 * length:
             return refusal  # or a piece that ends where it comes to the crossing
-        if refusal.code == "photo/leaves-frame" and _lies_on(best, [path]):
+        if refusal.code == "photo/leaves-frame" and lies_on(best, [path]):
             return refusal
     if not best.evidence.enough:
         return Rejected(photo.name, unlike_a_cable(best.evidence))
@@ -261,7 +261,7 @@ def _widest_alike(likely: list[RoughCable]) -> RoughCable:
     best = likely[0]
     for found in likely[1:]:
         wider = found.half_width_px > _WIDER * best.half_width_px and found.contrast > 0.95 * best.contrast
-        if wider and found.evidence.value > 0.85 * best.evidence.value and _lies_on(found, [best.path_px]):
+        if wider and found.evidence.value > 0.85 * best.evidence.value and lies_on(found, [best.path_px]):
             best = found
     return best
 
@@ -275,7 +275,7 @@ def _is_rival(found: RoughCable, best: RoughCable) -> bool:
     """True for a strip of about the width of the best, elsewhere, that is as surely a cable and about as long."""
     alike = WIDTH_RATIO_RANGE[0] < found.half_width_px / best.half_width_px < WIDTH_RATIO_RANGE[1]
     long = found.evidence.value > _RIVAL * best.evidence.value
-    return alike and long and found.evidence.enough and not _lies_on(found, [best.path_px])
+    return alike and long and found.evidence.enough and not lies_on(found, [best.path_px])
 
 
 def _length_beyond(path: Array, best: RoughCable) -> float:
@@ -284,7 +284,7 @@ def _length_beyond(path: Array, best: RoughCable) -> float:
     return float(step_lengths(path)[away[1:]].sum())
 
 
-def _lies_on(found: RoughCable, paths: list[Array]) -> bool:
+def lies_on(found: RoughCable, paths: list[Array]) -> bool:
     """True if most of the cable found lies within half a width of one of the paths (px)."""
     first, last = found.visible
     body = found.path_px[first : last + 1]

@@ -47,7 +47,8 @@ from pipeline.vision.scale.calibration import (
     in_plane_of_cable,
     with_doubt_of_plane,
 )
-from pipeline.vision.shots import Shot, find_cables, of_one_size, with_fixed_cover
+from pipeline.vision.series_search import Shot
+from pipeline.vision.shots import find_cables, of_one_size, with_fixed_cover
 from pipeline.vision.single import shown
 from pipeline.vision.stated_width import with_width_seen
 

@@ -8,107 +8,25 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from pipeline.messages import Message
-from pipeline.records import Finding, LoadStep, Preview, Rejected, Specimen, doubtful, inferred
+from pipeline.records import Finding, Rejected, Specimen, doubtful, inferred
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.cover_size import cover_radius
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.bearings.rim import SAME_RADIUS
-from pipeline.vision.bearings.steady import fixed_cover, moved_axes
+from pipeline.vision.bearings.steady import fixed_cover
 from pipeline.vision.guard import guarded
 from pipeline.vision.judgement import Cable
-from pipeline.vision.photo import Photo, load_photo
-from pipeline.vision.preview import reduce_photo
+from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.calibration import Calibration, from_number
-from pipeline.vision.segmentation import find_cable
-
-
-@dataclass(frozen=True)
-class Shot:
-    """One photo of the series: its step, the cable found on it or the reason why not, and its size if it has one."""
-
-    step: LoadStep
-    found: RoughCable | Rejected
-    preview: Preview | None
-    size: tuple[int, int] | None = None
-
-
-@dataclass(frozen=True)
-class _Search:
-    """The search on the photos of a specimen.
-
-    Attributes
-    ----------
-    specimen : Specimen
-    settings : VisionSettings
-    calibration : Calibration or None
-    cover_px : px or None
-        Diameter of covers that were seen where nobody gave it.
-    """
-
-    specimen: Specimen
-    settings: VisionSettings
-    calibration: Calibration | None
-    cover_px: float | None = None
-
-    @cached_property
-    def steps(self) -> list[LoadStep]:
-        """Steps whose photos exist."""
-        return [step for step in self.specimen.steps if step.image in self.specimen.images]
-
-    def load(self, step: LoadStep) -> Photo | Rejected:
-        """The photo of a step."""
-        name = str(step.image)
-        return guarded(name, partial(load_photo, self.specimen.images[name], self.settings.photo, name=name))
-
-    def find_as(self, photo: Photo, cable: Cable, near: RoughCable | None = None) -> RoughCable | Rejected:
-        """The cable of which something is known."""
-        hints = self.specimen.hints.get(photo.name)
-        return guarded(photo.name, partial(find_cable, photo, cable=cable, near=near, hints=hints))
-
-    def find(self, photo: Photo, step: LoadStep, near: RoughCable | None) -> RoughCable | Rejected:
-        """The cable by what specimen and scale tell, near where a neighbour photo shows it."""
-        return self.find_as(photo, self._expected(step.displacement_m - self.steps[0].displacement_m), near)
-
-    def find_all(self) -> list[Shot]:
-        """All photos, each searched near where the cable was on the one before."""
-        shots: list[Shot] = []
-        near: RoughCable | None = None
-        for step in self.steps:
-            photo = self.load(step)
-            if isinstance(photo, Rejected):
-                shots.append(Shot(step, photo, None))
-                continue
-            found = self.find(photo, step, near)
-            shown = guarded(photo.name, partial(reduce_photo, photo, self.settings.preview))
-            shots.append(Shot(step, found, None if isinstance(shown, Rejected) else shown, photo.size))
-            near = found if isinstance(found, RoughCable) else near
-        return shots
-
-    def _expected(self, travel: float) -> Cable:
-        """What is known of the cable on a photo taken ``travel`` (m) of the moving bearing after the first photo."""
-        specimen, rig = self.specimen, self.specimen.rig
-        covered = rig.marker_diameter_m is not None
-        if self.calibration is None:
-            # Without a scale the travel in px is unknown: the user's axes hold for the first photo only.
-            given = rig.bearings_px if travel == 0.0 and not covered else None
-            widths = None if rig.marker_diameter_m is None else rig.marker_diameter_m / specimen.diameter_m
-            cable = Cable(bearings=BearingHints(cover_widths=widths, given_px=given))
-            cable = replace(cable, slenderness=specimen.length_m / specimen.diameter_m)
-        else:
-            scale, given = self.calibration.scale.px_per_m, None
-            if rig.bearings_px is not None and not covered:
-                given = moved_axes(rig.bearings_px, rig.moving_bearing, travel, self.calibration.plane)
-            cover = None if rig.marker_diameter_m is None else rig.marker_diameter_m * scale
-            hints = BearingHints(cover_px=cover, given_px=given)
-            cable = Cable(specimen.diameter_m * scale, specimen.length_m * scale, hints)
-        return cable if self.cover_px is None else replace(cable, bearings=BearingHints(cover_px=self.cover_px))
+from pipeline.vision.series_search import Search, Shot, count_alike
+from pipeline.vision.what_moves import found_moving
 
 
 def find_cables(
@@ -116,7 +34,7 @@ def find_cables(
 ) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Find the cable on all photos, and where its visible ends cannot be the axes, the covers that hide them."""
     rig = specimen.rig
-    search = _Search(specimen, settings, calibration)
+    search = Search(specimen, settings, calibration)
     if calibration is None and rig.bearings_px is not None and rig.marker_diameter_m is None:
         # The cable's length on the first photo, for which the axes are given, tells where they go from there.
         first = search.load(search.steps[0])
@@ -125,32 +43,29 @@ def find_cables(
             known = from_number(cable.length_px / specimen.length_m, settings.calibration)
             search = replace(search, calibration=known)
     shots = _once_more(search, search.find_all())
+    moved = guarded("", partial(found_moving, search, shots))  # where it breaks on a photo, the rest stays found
+    shots, old = shots if isinstance(moved, Rejected) else moved, shots
+    count = sum(new is not shot for new, shot in zip(shots, old, strict=True))
+    told = (inferred("photo/still-ground", count=count),) if count else ()
     found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
     if rig.marker_diameter_m is not None or rig.bearings_px is not None or not found:
-        return shots, ()
+        return shots, told
     most = settings.series.max_length_deviation
     if calibration is not None:
         # Ends lost here and there under covers leave the right length on the median too, not on each photo.
         stated = calibration.scale.px_per_m * specimen.length_m
-        if _count_alike(found, most, stated) == len(found):
-            return shots, ()
+        if count_alike(found, most, stated) == len(found):
+            return shots, told
     ends = [found[0], found[-1]] if len(found) > 1 else found
     radius = guarded("", lambda: cover_radius(_with_photos(search, ends)))
     if radius is not None and not isinstance(radius, Rejected):  # where the search breaks on a photo, it tells none
         again = replace(search, cover_px=2.0 * radius).find_all()
-        if _count_alike(again, most) >= _count_alike(shots, most):
+        if count_alike(again, most) >= count_alike(shots, most):
             return again, (inferred("rig/covers-found", diameter_px=2.0 * radius),)
-    return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], ()
+    return shots if calibration is not None else [_with_axes_shown(shot) for shot in shots], told
 
 
-def _count_alike(shots: list[Shot], most: float, length_px: float | None = None) -> int:
-    """Number of photos whose cable has a length, or that of the median photo, to a relative deviation."""
-    lengths = np.array([shot.found.length_px for shot in shots if isinstance(shot.found, RoughCable)])
-    usual = float(np.median(lengths)) if length_px is None and len(lengths) else length_px
-    return 0 if usual is None else int(np.count_nonzero(np.abs(lengths / usual - 1.0) <= most))
-
-
-def _once_more(search: _Search, shots: list[Shot]) -> list[Shot]:
+def _once_more(search: Search, shots: list[Shot]) -> list[Shot]:
     """Search photos without a cable again, with what the other photos have told since.
 
     Those before the first cable had no neighbour. Without a scale the covers are expected in widths of the cable, and
@@ -173,7 +88,7 @@ def _once_more(search: _Search, shots: list[Shot]) -> list[Shot]:
     return settled
 
 
-def _scale_of_covers(search: _Search, shots: list[Shot]) -> Calibration | None:
+def _scale_of_covers(search: Search, shots: list[Shot]) -> Calibration | None:
     """The scale by covers that are seen all round and alike on all photos; None if there are none, or of no size."""
     sure = [s.found for s in shots if isinstance(s.found, RoughCable) and s.found.left.sure and s.found.right.sure]
     radii = [axis.radius_px for cable in sure for axis in cable.axes if axis.radius_px is not None]
@@ -195,7 +110,7 @@ def _with_axes_shown(shot: Shot) -> Shot:
     return replace(shot, found=Rejected(cable.image, Message("photo/bearing.vanishes", u_px=u, v_px=v)))
 
 
-def _with_photos(search: _Search, shots: list[Shot]) -> Iterator[tuple[Photo, RoughCable]]:
+def _with_photos(search: Search, shots: list[Shot]) -> Iterator[tuple[Photo, RoughCable]]:
     """The photos once more: they are not kept, a series of them would not fit into memory."""
     for shot in shots:
         photo = search.load(shot.step)
@@ -220,7 +135,7 @@ def with_fixed_cover(
     diameter = None if fixed.cover.radius_px is None else 2.0 * fixed.cover.radius_px
     hints = BearingHints(cover_px=diameter)
     expected = Cable(specimen.diameter_m * scale, specimen.length_m * scale, hints)
-    search, settled = _Search(specimen, settings, calibration), list(shots)
+    search, settled = Search(specimen, settings, calibration), list(shots)
     for k, cable in ((there[i], found[i]) for i in fixed.astray):
         photo = search.load(shots[k].step)
         again = photo if isinstance(photo, Rejected) else search.find_as(photo, expected)

@@ -59,7 +59,7 @@ def follow(standout: Standout, cut: CrossCut, width: float, *, least: float = MI
     for _ in range(2):
         path = path[::-1]
         longer = _ahead(standout, cut, path, width, least)
-        while longer is not None and len(longer) < most:
+        while longer is not None and len(path) < len(longer) < most:  # led from farther back it may be no longer
             path = longer
             longer = _ahead(standout, cut, path, width, least)
     return path if len(path) > len(cut.path) else None

@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.records import Centerline, Rejected, RigSpec
 from pipeline.vision import series as series_module
+from pipeline.vision import series_search as search_module
 from pipeline.vision import shots as shots_module
 from pipeline.vision import single as single_module
 from pipeline.vision.guard import jointly
@@ -48,13 +49,13 @@ def test_work_on_all_photos_that_always_breaks_says_why_on_each(
 def test_photo_that_breaks_the_program_costs_that_photo_alone(
     stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    modules = {"load_photo": shots_module, "find_cable": shots_module, "with_strip": single_module}
+    modules = {"load_photo": search_module, "find_cable": search_module, "with_strip": single_module}
     module = modules.get(stage, series_module)
     sound, calls = getattr(module, stage), []
 
     def broken(*args: object, **named: object) -> object:
         calls.append(args)
-        if len(calls) == 2:
+        if len(calls) == 2 or (stage == "find_cable" and args[0].name == "step_01.png"):  # it is searched twice
             raise np.linalg.LinAlgError("Singular matrix")
         return sound(*args, **named)
 
@@ -70,7 +71,7 @@ def test_a_picture_that_cannot_be_shown_is_measured(tmp_path: Path, monkeypatch:
     def broken(*_: object) -> object:
         raise cv2.error
 
-    monkeypatch.setattr(shots_module, "reduce_photo", broken)
+    monkeypatch.setattr(search_module, "reduce_photo", broken)
     assert all(line.preview is None for line in lines(trace_series(series(tmp_path), SETTINGS)))
 
 

@@ -8,7 +8,8 @@ from pipeline.records import LoadStep, Rejected
 from pipeline.vision.photo import Photo
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.segmentation import find_cable
-from pipeline.vision.shots import Shot, of_one_size
+from pipeline.vision.series_search import Shot
+from pipeline.vision.shots import of_one_size
 
 NOTHING = np.empty(0)
 

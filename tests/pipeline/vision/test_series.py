@@ -19,7 +19,7 @@ from pipeline.messages import Message
 from pipeline.records import CameraSpec, Centerline, LoadStep, PhotoHints, Rejected, RigSpec, Side, Specimen, Traces
 from pipeline.settings import IntakeSettings
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision import shots as shots_module
+from pipeline.vision import series_search as search_module
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Scene, Sensor, Strand, render
@@ -174,7 +174,7 @@ def test_other_photos_tell_where_the_fixed_cover_stands(
 
     A dot on another thing makes it sure of a cover; the log is against it all the same.
     """
-    sound = shots_module.find_cable
+    sound = search_module.find_cable
 
     def misled(
         photo: Photo,
@@ -189,7 +189,7 @@ def test_other_photos_tell_where_the_fixed_cover_stands(
         u, v = found.right.center_px
         return replace(found, right=replace(found.right, center_px=(u + 30.0, v + 20.0), sure=sure))
 
-    monkeypatch.setattr(shots_module, "find_cable", misled)
+    monkeypatch.setattr(search_module, "find_cable", misled)
     traces = trace_series(series(tmp_path), SETTINGS)
     assert [isinstance(photo, Rejected) for photo in traces.photos] == [False, False, always]
     assert {photo.code for photo in traces.photos if isinstance(photo, Rejected)} <= {"photo/bearing"}
@@ -204,7 +204,7 @@ def test_a_cover_half_seen_on_one_photo_does_not_make_the_others_doubt_theirs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a photo taken in motion the rim is doubled: that its cover lies 2 px away is within its own error."""
-    sound = shots_module.find_cable
+    sound = search_module.find_cable
 
     def doubled(photo: Photo, **known: Any) -> RoughCable | Rejected:
         found = sound(photo, **known)
@@ -213,7 +213,7 @@ def test_a_cover_half_seen_on_one_photo_does_not_make_the_others_doubt_theirs(
         u, v = found.right.center_px
         return replace(found, right=replace(found.right, center_px=(u + 2.0, v), std_px=1.0, sure=False))
 
-    monkeypatch.setattr(shots_module, "find_cable", doubled)
+    monkeypatch.setattr(search_module, "find_cable", doubled)
     traces = trace_series(series(tmp_path), SETTINGS)
     assert not codes(traces)
     for line in lines(traces)[:2]:
@@ -361,18 +361,20 @@ def test_photos_without_a_cable_are_searched_again_with_what_the_others_tell(
     scale_error: float | None, lost: tuple[int, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Told of a neighbour, or without a scale of the covers' size; one that was told all this is not searched twice."""
-    sound, asked = shots_module.find_cable, []
+    sound, asked = search_module.find_cable, []
 
     def strict(
         photo: Photo, *, cable: Cable, near: RoughCable | None, hints: PhotoHints | None
     ) -> RoughCable | Rejected:
+        if photo.taken is not None:
+            return Rejected(photo.name, Message("photo/crossing"))  # without the ground nothing more is seen
         asked.append(photo.name)
         told = near is not None and cable.diameter_px is not None and lost != (2,)
         if told or int(photo.name[5:7]) not in lost:
             return sound(photo, cable=cable, near=near)
         return Rejected(photo.name, Message("photo/crossing"))
 
-    monkeypatch.setattr(shots_module, "find_cable", strict)
+    monkeypatch.setattr(search_module, "find_cable", strict)
     photos = trace_series(series(tmp_path, scale_error=scale_error), FLAT).photos
     again = () if lost == (2,) else lost
     assert [isinstance(photo, Centerline) for photo in photos] == [k in again or k not in lost for k in range(3)]

@@ -1,0 +1,63 @@
+"""A series searched without its ground, where a photo shows no cable or one of another length."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.records import Rejected
+from pipeline.vision.photo import Photo
+from pipeline.vision.rough import RoughCable
+from pipeline.vision.segmentation import lies_on
+from pipeline.vision.series_search import Search, Shot, count_alike
+from pipeline.vision.still_ground import Ground
+
+_LEAST_PHOTOS = 3  # of two nobody knows which shows the ground
+_MOST_PHOTOS = 7  # held at once; they tell the ground to half of a photo's noise
+
+
+def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
+    """The photos of a series with the cables found without what stands still in it.
+
+    Twice: by the colour of what stands out, then by that of the cables found. A cable that was seen as well before
+    stays as it was found.
+    """
+    sizes = Counter(shot.size for shot in shots if shot.size is not None)
+    alike = [k for k, shot in enumerate(shots) if shot.size in dict(sizes.most_common(1))]
+    doubted = count_alike([shots[k] for k in alike], search.settings.series.max_length_deviation) < len(alike)
+    if not doubted or len(alike) < _LEAST_PHOTOS:
+        return shots
+    chosen = sorted({alike[i] for i in np.linspace(0, len(alike) - 1, _MOST_PHOTOS).astype(int)})
+    photos = {k: photo for k in chosen if isinstance(photo := search.load(shots[k].step), Photo)}
+    first = _searched(search, {k: shots[k] for k in alike}, photos, Ground.of(list(photos.values())))
+    cables = [(photo, first[k]) for k, photo in photos.items() if k in first]
+    middles = [(photo, cable.path_px[slice(*cable.visible)]) for photo, cable in cables]
+    if not middles:
+        return shots
+    second = _searched(search, {k: shots[k] for k in alike}, photos, Ground.of(list(photos.values()), middles))
+    settled = shots
+    for found in (first, second):
+        better = {k: cable for k, cable in found.items() if not _as_well(settled[k].found, cable)}
+        settled = [replace(shot, found=better[k]) if k in better else shot for k, shot in enumerate(settled)]
+    return settled
+
+
+def _searched(
+    search: Search, shots: dict[int, Shot], photos: dict[int, Photo], ground: Ground
+) -> dict[int, RoughCable]:
+    """The cables found on photos without the ground; those that are held are not loaded again."""
+    cables: dict[int, RoughCable] = {}
+    near: RoughCable | None = None
+    for k, shot in shots.items():
+        photo = photos.get(k) or search.load(shot.step)
+        found = photo if isinstance(photo, Rejected) else search.find(ground.without(photo), shot.step, near)
+        if isinstance(found, RoughCable):
+            cables[k] = near = found
+    return cables
+
+
+def _as_well(old: RoughCable | Rejected, new: RoughCable) -> bool:
+    """True if it is the same cable with no more evidence."""
+    return isinstance(old, RoughCable) and lies_on(old, [new.path_px]) and old.evidence.value >= new.evidence.value
