@@ -14,7 +14,7 @@ import numpy as np
 from scipy import special
 
 from pipeline.records import Array
-from rod.inverse.force_noise import last_digit
+from rod.inverse.force_noise import resolution
 from rod.measurement import MeasuredStep
 
 LEAST_SAMPLES = 4
@@ -48,7 +48,7 @@ def stuck_forces(steps: tuple[MeasuredStep, ...]) -> list[int]:
         return []
     every = np.abs(np.concatenate(samples))
     top = float(every.max())
-    digit = last_digit(every)
+    digit = resolution(samples)
     if all(values.size < LEAST_SAMPLES for values in samples):
         return _repeated(steps, samples, loaded, top) if digit < FINE * top else []
     holds = {i: _hold(values, digit) for i, values in enumerate(samples) if values.size >= LEAST_SAMPLES}

@@ -2,9 +2,9 @@
 
 Slots as wide as the cable, a second cable that lies there, a printed grid: on one photo nothing tells them from it. The
 camera stands still and the cable is pushed, so the median of the photos shows the ground alone, wherever the cable is
-on less than half of them. What stands out of that median has the colour of the cable. Nearer to the bearings the cable
-lies on most photos: there the ground is what those show that do not show this colour. Lamps flicker: photo and ground
-are held against each other with a gain for each colour.
+on less than half of them. What stands out of that median is the cable, its shadow or the rig, each of one colour.
+Nearer to the bearings the cable lies on most photos: there the ground is what those show that do not show its colour.
+Lamps flicker: photo and ground are held against each other with a gain for each colour.
 
 A photo without its ground shows how much of each pixel is cable: the difference from the ground along the step from
 there to the cable's colour, over that step. So a grey cable is the same over a black slot and over bright metal, and
@@ -18,14 +18,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.cluster.vq import kmeans2
 
 from pipeline.records import Array
 from pipeline.vision.median import medians, scatter
 from pipeline.vision.photo import Photo, reduce_area, values_at
-from pipeline.vision.search.backdrop import ROWS, choose_reduction, stand_out
+from pipeline.vision.search.backdrop import ROWS, choose_reduction, reduced, stand_out
 
 _ALIKE = 0.5  # of the step from ground to cable; a pixel nearer to the cable's colour than that is taken for it
 _FAINT = 5.0  # standard deviations of noise; a step from ground to cable of so many is weighed half
+_COLOURS = 3  # groups of colours that move: cable, shadow and rig
+_SAMPLE = 20000  # colours; more tell their groups no better
 _BLACK = 1.0 / 256.0  # of full range; added before a ratio is taken
 _CODES = 65535.0  # levels of 16 bit
 
@@ -46,23 +49,13 @@ class Ground:
     colour: Array
 
     @classmethod
-    def of(cls, photos: Sequence[Photo], cables: Sequence[tuple[Photo, Array]] = ()) -> Ground:
-        """The ground of photos of one size.
+    def of(cls, photos: Sequence[Photo], colour: Array) -> Ground:
+        """The ground of photos of one size, of which some show another colour (c,) of the cable in each place.
 
         Where all photos show the cable's colour, as a black slot below a black cable, they show the ground.
-
-        Parameters
-        ----------
-        photos : sequence of Photo
-        cables : sequence of (Photo, (n, 2) px)
-            The middle of the cable where it was found; without any its colour is that of what stands out.
         """
-        gains = [_gains(photo, photos[0]) for photo in photos]
-        picture = _median(photos, gains)
-        seen = [values_at(photo, path) * _gains(photo, picture) for photo, path in cables]
-        colour = np.median(np.concatenate(seen or [_moved(photo, picture) for photo in photos]), axis=0)
-        usual = np.median(_values(picture, slice(0, None, ROWS)).reshape(-1, len(colour)), axis=0)
-        return cls(_median(photos, gains, colour, _ALIKE * float(np.linalg.norm(colour - usual))), colour)
+        usual = np.median(_values(photos[0], slice(0, None, ROWS)).reshape(-1, len(colour)), axis=0)
+        return cls(_median(photos, colour, _ALIKE * float(np.linalg.norm(colour - usual))), colour)
 
     def without(self, photo: Photo) -> Photo:
         """How much of each pixel is cable: middle grey is none, white twice as much as all, as in a highlight."""
@@ -78,8 +71,21 @@ class Ground:
         return Photo(photo.name, share, 16, photo)
 
 
-def _median(photos: Sequence[Photo], gains: Sequence[Array], colour: Array | None = None, near: float = 0.0) -> Photo:
-    """Median of photos in one light, where some of them are not ``near`` a colour (c,), of those."""
+def moved_colours(photos: Sequence[Photo]) -> Array:
+    """Colours (k, c) of what stands out of the median of photos, as the first is lit: cable, shadow, rig."""
+    ground = _median(photos)
+    moved = np.concatenate([_moved(photo, ground) for photo in photos])
+    return np.asarray(kmeans2(moved[:: max(1, len(moved) // _SAMPLE)], _COLOURS, minit="++", seed=0)[0])
+
+
+def colour_along(cables: Sequence[tuple[Photo, Array]], like: Photo) -> Array:
+    """Colour (c,) along the middles (n, 2) px of cables, as the photo ``like`` is lit."""
+    return medians(np.concatenate([values_at(photo, path) * _gains(photo, like) for photo, path in cables]), axis=0)
+
+
+def _median(photos: Sequence[Photo], colour: Array | None = None, near: float = 0.0) -> Photo:
+    """Median of photos as the first is lit, where some of them are not ``near`` a colour (c,), of those."""
+    gains = [_gains(photo, photos[0]) for photo in photos]
     first = photos[0]
     picture = np.empty((*first.pixels.shape[:2], first.channels), np.uint16)
     for rows in _bands(first):
@@ -98,11 +104,12 @@ def _median(photos: Sequence[Photo], gains: Sequence[Array], colour: Array | Non
 
 def _moved(photo: Photo, ground: Photo) -> Array:
     """Colours (n, c) of what stands out of the ground on a photo, in the light of the ground."""
-    away = np.concatenate([_values(photo, rows) - _lit(ground, rows, _gains(ground, photo)) for rows in _bands(photo)])
-    coded = _coded(0.5 + 0.5 * away).reshape(photo.pixels.shape)
-    standout = stand_out(Photo(photo.name, coded, 16), choose_reduction(photo.size, None))
-    cells = np.argwhere(standout.distance > standout.levels[0])[:, ::-1].astype(float)
-    return values_at(photo, standout.to_pixels(cells)) * _gains(photo, ground)
+    moved = np.concatenate([_values(photo, rows) - _lit(ground, rows, _gains(ground, photo)) for rows in _bands(photo)])
+    coded = _coded(0.5 + 0.5 * moved).reshape(photo.pixels.shape)
+    reduction = choose_reduction(photo.size, None)
+    standout = stand_out(Photo(photo.name, coded, 16), reduction)
+    away = standout.distance > standout.levels[0]
+    return np.asarray(reduced(photo, reduction).picture[away] * _gains(photo, ground))
 
 
 def _bands(photo: Photo) -> Iterator[slice]:

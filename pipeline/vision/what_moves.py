@@ -12,7 +12,7 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import lies_on
 from pipeline.vision.series_search import Search, Shot, count_alike
-from pipeline.vision.still_ground import Ground
+from pipeline.vision.still_ground import Ground, colour_along, moved_colours
 
 _LEAST_PHOTOS = 3  # of two nobody knows which shows the ground
 _MOST_PHOTOS = 7  # held at once; they tell the ground to half of a photo's noise
@@ -21,8 +21,8 @@ _MOST_PHOTOS = 7  # held at once; they tell the ground to half of a photo's nois
 def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
     """The photos of a series with the cables found without what stands still in it.
 
-    Twice: by the colour of what stands out, then by that of the cables found. A cable that was seen as well before
-    stays as it was found.
+    Twice: by the colour of what moves in which the farthest photo shows the likeliest cable, then by that of the cables
+    found. A cable that was seen as well before stays as it was found.
     """
     sizes = Counter(shot.size for shot in shots if shot.size is not None)
     alike = [k for k, shot in enumerate(shots) if shot.size in dict(sizes.most_common(1))]
@@ -31,12 +31,16 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
         return shots
     chosen = sorted({alike[i] for i in np.linspace(0, len(alike) - 1, _MOST_PHOTOS).astype(int)})
     photos = {k: photo for k in chosen if isinstance(photo := search.load(shots[k].step), Photo)}
-    first = _searched(search, {k: shots[k] for k in alike}, photos, Ground.of(list(photos.values())))
-    cables = [(photo, first[k]) for k, photo in photos.items() if k in first]
-    middles = [(photo, cable.path_px[slice(*cable.visible)]) for photo, cable in cables]
-    if not middles:
+    held, sought = list(photos.values()), {k: shots[k] for k in alike}
+    farthest = max(photos, key=lambda k: abs(shots[k].step.displacement_m - shots[0].step.displacement_m))
+    grounds = [Ground.of(held, colour) for colour in moved_colours(held)]
+    tried = [(_searched(search, {farthest: shots[farthest]}, photos, ground).values(), ground) for ground in grounds]
+    likely = [(cable.evidence.value, k) for k, (cables, _) in enumerate(tried) for cable in cables]
+    if not likely:
         return shots
-    second = _searched(search, {k: shots[k] for k in alike}, photos, Ground.of(list(photos.values()), middles))
+    first = _searched(search, sought, photos, grounds[max(likely)[1]])
+    middles = [(photo, first[k].path_px[slice(*first[k].visible)]) for k, photo in photos.items() if k in first]
+    second = _searched(search, sought, photos, Ground.of(held, colour_along(middles, held[0])))
     settled = shots
     for found in (first, second):
         better = {k: cable for k, cable in found.items() if not _as_well(settled[k].found, cable)}

@@ -12,6 +12,7 @@ on one hold have the wide tails of the samples of that hold.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -138,7 +139,7 @@ def common_rounding(steps: tuple[MeasuredStep, ...], std: Array) -> Array:
         Of one sample, its rounding included.
     """
     samples = [np.array([step.force]) if step.hold_forces is None else step.hold_forces for step in steps]
-    digit = last_digit(np.concatenate(samples))
+    digit = resolution(samples)
     if not digit > 0.0:
         return np.zeros(len(steps))
     scatter = np.maximum((std / digit) ** 2 - 1.0 / 12.0, 0.0)
@@ -149,9 +150,29 @@ def common_rounding(steps: tuple[MeasuredStep, ...], std: Array) -> Array:
 ROUNDING = 1e-9
 """Of the largest force: numbers that close are the same number."""
 
+LEAST_GAPS, LEAST_STEP = 3, 50.0
+"""Differences within holds, and decimals of a step: chance makes three of fifty decimals multiples of the least once in
+a hundred.
+"""
 
-def last_digit(forces: Array) -> float:
-    """Value of the last decimal of all forces, N; 0 if they have no end, as after a conversion of units."""
+
+def resolution(samples: Sequence[Array]) -> float:
+    """Step (N) between the forces that a load cell can show; 0 if there is none, as after a conversion of units.
+
+    Whole steps of a converter, 0.0223 N, are logged with more digits than they have: where all differences within the
+    holds are multiples of the least one, that is the step, else the last decimal.
+    """
+    digit = _last_digit(np.concatenate(samples))
+    gaps = np.concatenate([np.diff(np.unique(hold)) for hold in samples])
+    if gaps.size < LEAST_GAPS or not digit > 0.0:
+        return digit
+    step = float(gaps.min())
+    whole = np.abs(gaps - step * np.round(gaps / step)) <= 2.0 * digit
+    return step if step > LEAST_STEP * digit and whole.all() else digit
+
+
+def _last_digit(forces: Array) -> float:
+    """Value of the last decimal of all forces, N; 0 if they have no end."""
     top = float(np.max(np.abs(forces), initial=0.0))
     for places in range(-3, 13):
         if np.all(np.abs(forces - np.round(forces, places)) <= ROUNDING * top):

@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.faults import faults_of_input
 from pipeline.faults.stuck_forces import stuck_forces
+from rod.inverse.force_noise import common_rounding, resolution
 from rod.measurement import MeasuredStep, MeasuredTest
 
 LEVELS = (0.0, 2.4, 2.9, 3.1, 3.2, 3.25)
@@ -48,6 +49,22 @@ def test_steps_at_the_end_of_the_range(noise, digits):
 def test_a_channel_that_freezes(level):
     frozen = changed(log(), lambda s: np.full(8, level) if s.step > 1 else s.hold_forces)
     assert stuck_forces(frozen) == [2, 3, 4, 5]
+
+
+def test_a_hold_at_the_top_that_shows_one_step_of_a_coarse_cell_is_live():
+    """11 bits over 45 N, logged with four decimals: the last hold lies in the middle of a step, the others change."""
+    step, rng = 45.7 / 2048, np.random.default_rng(3)
+    counts = np.array([0.0, 272.4, 318.6, 346.5, 367.4, 385.5, 400.0])
+    read = [np.round(np.round(level + 0.15 * rng.standard_normal(11)) * step, 4) for level in counts]
+    steps = tuple(
+        MeasuredStep(k, "loading" if k else "mounted", 0.01 * k, hold.mean(), 0.004, hold_forces=hold)
+        for k, hold in enumerate(read)
+    )
+    assert np.ptp(read[-1]) == 0.0 and sum(np.ptp(hold) > 0.0 for hold in read) >= 4
+    assert stuck_forces(steps) == []
+    assert resolution(read) == pytest.approx(step, abs=2e-4)
+    off = np.full(len(steps), step / np.sqrt(12.0))
+    assert common_rounding(steps, off)[-1] == pytest.approx(step / np.sqrt(12.0), rel=0.05)
 
 
 def test_single_samples_that_repeat_the_largest_force():

