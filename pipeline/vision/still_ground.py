@@ -75,7 +75,11 @@ def moved_colours(photos: Sequence[Photo]) -> Array:
     """Colours (k, c) of what stands out of the median of photos, as the first is lit: cable, shadow, rig."""
     ground = _median(photos)
     moved = np.concatenate([_moved(photo, ground) for photo in photos])
-    return np.asarray(kmeans2(moved[:: max(1, len(moved) // _SAMPLE)], _COLOURS, minit="++", seed=0)[0])
+    sample = moved[:: max(1, len(moved) // _SAMPLE)]
+    few = np.unique(sample, axis=0)  # of an even picture
+    if len(few) <= _COLOURS:
+        return few
+    return np.asarray(kmeans2(sample, _COLOURS, minit="++", missing="raise", seed=0)[0])
 
 
 def colour_along(cables: Sequence[tuple[Photo, Array]], like: Photo) -> Array:
