@@ -108,10 +108,9 @@ def _median(photos: Sequence[Photo], colour: Array | None = None, near: float = 
 
 def _moved(photo: Photo, ground: Photo) -> Array:
     """Colours (n, c) of what stands out of the ground on a photo, in the light of the ground."""
-    moved = np.concatenate([_values(photo, rows) - _lit(ground, rows, _gains(ground, photo)) for rows in _bands(photo)])
-    coded = _coded(0.5 + 0.5 * moved).reshape(photo.pixels.shape)
-    reduction = choose_reduction(photo.size, None)
-    standout = stand_out(Photo(photo.name, coded, 16), reduction)
+    gains, reduction = _gains(ground, photo), choose_reduction(photo.size, None)
+    coded = [_coded(0.5 + 0.5 * (_values(photo, rows) - _lit(ground, rows, gains))) for rows in _bands(photo)]
+    standout = stand_out(Photo(photo.name, np.concatenate(coded).reshape(photo.pixels.shape), 16), reduction)
     away = standout.distance > standout.levels[0]
     return np.asarray(reduced(photo, reduction).picture[away] * _gains(photo, ground))
 
