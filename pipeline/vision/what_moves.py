@@ -40,9 +40,11 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
         return shots
     first = _searched(search, sought, photos, grounds[max(likely)[1]])
     middles = [(photo, first[k].path_px[slice(*first[k].visible)]) for k, photo in photos.items() if k in first]
-    second = _searched(search, sought, photos, Ground.of(held, colour_along(middles, held[0])))
+    rounds = [first]
+    if middles:
+        rounds.append(_searched(search, sought, photos, Ground.of(held, colour_along(middles, held[0]))))
     settled = shots
-    for found in (first, second):
+    for found in rounds:
         better = {k: cable for k, cable in found.items() if not _as_well(settled[k].found, cable)}
         settled = [replace(shot, found=better[k]) if k in better else shot for k, shot in enumerate(settled)]
     return settled
