@@ -23,7 +23,7 @@ from scipy.cluster.vq import kmeans2
 from pipeline.records import Array
 from pipeline.vision.median import medians, scatter
 from pipeline.vision.photo import Photo, reduce_area, values_at
-from pipeline.vision.search.backdrop import ROWS, choose_reduction, reduced, stand_out
+from pipeline.vision.search.backdrop import MIN_GROUND_STD, ROWS, choose_reduction, reduced, stand_out
 
 _ALIKE = 0.5  # of the step from ground to cable; a pixel nearer to the cable's colour than that is taken for it
 _FAINT = 5.0  # standard deviations of noise; a step from ground to cable of so many is weighed half
@@ -61,7 +61,8 @@ class Ground:
         """How much of each pixel is cable: middle grey is none, white twice as much as all, as in a highlight."""
         gains, every = _gains(self.picture, photo), slice(0, None, max(1, len(photo.pixels) // ROWS))
         off = _values(photo, every) - _lit(self.picture, every, gains)
-        faint = _FAINT**2 * float(sum(scatter(each, 0.0) ** 2 for each in np.moveaxis(off, -1, 0)))
+        noise = [max(scatter(each, 0.0), MIN_GROUND_STD) for each in np.moveaxis(off, -1, 0)]
+        faint = (_FAINT * float(np.hypot.reduce(noise))) ** 2
         share = np.empty(photo.pixels.shape[:2], np.uint16)
         for rows in _bands(photo):
             ground = _lit(self.picture, rows, gains)

@@ -24,8 +24,8 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
     Twice: by the colour of what moves in which the farthest photo shows the likeliest cable, then by that of the cables
     found. A cable that was seen as well before stays as it was found.
     """
-    sizes = Counter(shot.size for shot in shots if shot.size is not None)
-    alike = [k for k, shot in enumerate(shots) if shot.size in dict(sizes.most_common(1))]
+    usable = {k: shot.size for k, shot in enumerate(shots) if shot.size is not None and not _is_spoilt(shot)}
+    alike = [k for k, size in usable.items() if size in dict(Counter(usable.values()).most_common(1))]
     doubted = count_alike([shots[k] for k in alike], search.settings.series.max_length_deviation) < len(alike)
     if not doubted or len(alike) < _LEAST_PHOTOS:
         return shots
@@ -62,6 +62,11 @@ def _searched(
         if isinstance(found, RoughCable):
             cables[k] = near = found
     return cables
+
+
+def _is_spoilt(shot: Shot) -> bool:
+    """True for a photo that shows nothing, or nothing sharp, whatever lies on the ground."""
+    return isinstance(shot.found, Rejected) and shot.found.code in ("photo/blank", "photo/blur")
 
 
 def _as_well(old: RoughCable | Rejected, new: RoughCable) -> bool:
