@@ -90,8 +90,7 @@ def colour_along(cables: Sequence[tuple[Photo, Array]], like: Photo) -> Array:
 
 def _median(photos: Sequence[Photo], colour: Array | None = None, near: float = 0.0) -> Photo:
     """Median of photos as the first is lit, where some of them are not ``near`` a colour (c,), of those."""
-    gains = [_gains(photo, photos[0]) for photo in photos]
-    first = photos[0]
+    first, gains = photos[0], [_gains(photo, photos[0]) for photo in photos]
     picture = np.empty((*first.pixels.shape[:2], first.channels), np.uint16)
     for rows in _bands(first):
         lit = np.stack([_lit(photo, rows, gain) for photo, gain in zip(photos, gains, strict=True)], axis=-1)

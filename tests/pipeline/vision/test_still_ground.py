@@ -32,17 +32,23 @@ def arc(chord: float) -> np.ndarray:
     return middle + radius * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
 
 
+ZOOM = 3
+
+
+def at(points: np.ndarray) -> np.ndarray:
+    """Points (..., 2) px in sixteenths of a pixel of the larger picture, as OpenCV draws them."""
+    return np.rint(16.0 * (ZOOM * (np.asarray(points) + 0.5) - 0.5)).astype(int)
+
+
 def drawn(
     bed: np.ndarray, chord: float, colour: tuple[int, ...], *, covers: bool, light: float, seed: int
 ) -> np.ndarray:
     """The bed (h, w, 3) with a cable of that colour on it."""
-    zoom = 3
-    cable, cover = np.zeros((2, SIZE[1] * zoom, SIZE[0] * zoom), np.uint8)
-    at = lambda points: np.rint(16.0 * (zoom * (np.asarray(points) + 0.5) - 0.5)).astype(int)  # noqa: E731
-    cv2.polylines(cable, [at(arc(chord))[:, None]], False, 255, round(WIDTH * zoom), cv2.LINE_AA, 4)
+    cable, cover = np.zeros((2, SIZE[1] * ZOOM, SIZE[0] * ZOOM), np.uint8)
+    cv2.polylines(cable, [at(arc(chord))[:, None]], False, 255, round(WIDTH * ZOOM), cv2.LINE_AA, 4)
     for axis in arc(chord)[[0, -1]]:
         for radius, value in ((0.5 * COVER, 255), (4.0, 0)):
-            cv2.circle(cover, at(axis).tolist(), round(16.0 * zoom * radius), value, cv2.FILLED, cv2.LINE_AA, 4)
+            cv2.circle(cover, at(axis).tolist(), round(16.0 * ZOOM * radius), value, cv2.FILLED, cv2.LINE_AA, 4)
     masks = [cv2.resize(mask, SIZE, interpolation=cv2.INTER_AREA)[..., None] / 255.0 for mask in (cable, cover)]
     picture = bed + masks[0] * (np.array(colour) - bed)
     picture = picture + covers * masks[1] * (225.0 - picture)
