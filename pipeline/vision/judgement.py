@@ -98,7 +98,7 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
-    crossed = crossed_at(standout, cut)
+    crossed = None if cable.path_px else crossed_at(standout, cut)  # a person knows which arm it is
     axes = _axes(photo, standout, reading, strip, cut, cable)
     if isinstance(axes, Rejected):
         if crossed is not None:  # which of its arms leaves the picture nobody can tell

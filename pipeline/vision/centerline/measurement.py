@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.messages import Message
 from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
@@ -238,7 +239,9 @@ def centerline_of(
     waves = seen_waves([followed.half_widths()]) if waves is None else waves
     errors = slow_errors(followed.fit, float(np.hypot(waves.own, waves.common)), waves.length)
     fit, covariance = continue_to_axes(followed.fit, followed.covariance + errors, chord, width=middle, told=told)
-    feet = feet_of_axes(fit, chord)[0]
+    feet, left = feet_of_axes(fit, chord)
+    if left.max() > middle:
+        return Rejected(rough.image, Message("photo/bearing.missed", diameters=min(float(left.max()) / middle, 99.0)))
     s = np.linspace(feet[0], feet[1], max(settings.curve.points, 2 * fit.curve.frame.size))
     shape = _shape(
         fit, s, _with_axes(covariance, followed.axis_std(fit, feet), chord.chord), followed.light, waves, width=middle

@@ -63,6 +63,25 @@ def test_clicks_tell_which_cable_and_where_it_ends(tmp_path):
     assert np.hypot(found.u_px[0] - clicks[0][0], found.v_px[0] - clicks[0][1]) < WIDTH
 
 
+def test_clicks_lead_over_a_crossing(tmp_path):
+    """Another cable crosses it: which arm goes on nobody but a person can say."""
+    bow = _bow()
+    path = _written(tmp_path, bow, np.array([[300.0, 40.0], [480.0, 400.0]]))
+    found = trace_photo(path)
+    assert isinstance(found, Rejected) and found.code == "photo/crossing"
+    found = trace_photo(path, hints=PhotoHints(path_px=tuple(map(tuple, bow[5:-5:48].tolist()))))
+    assert isinstance(found, Centerline), found.reason
+    assert _off(found, bow) < 0.3
+
+
+def test_a_curve_that_does_not_reach_the_axes_is_refused(tmp_path):
+    """Clicks go on over bare ground and turn there: nothing measured leads to the last one."""
+    bow = _bow()
+    clicks = (*map(tuple, bow[200:-5:30].tolist()), (760.0, 390.0), (640.0, 410.0))
+    found = trace_photo(_written(tmp_path, bow), hints=PhotoHints(path_px=clicks))
+    assert isinstance(found, Rejected) and found.code == "photo/bearing"
+
+
 def test_what_is_excluded_moves_nothing_and_is_hidden(tmp_path):
     """A bright bolt below the cable's edge: without its edges the cable is where it is, and not seen there."""
     at = _bow()[200] + np.array([0.0, 5.0])
