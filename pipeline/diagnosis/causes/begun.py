@@ -13,6 +13,7 @@ begins.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,8 @@ class Begun(Cause):
     """What is so from one hold on: ``at`` is the index of its step, ``width`` 1 if it grows from then on."""
 
     seat = "cable"
+    known: ClassVar[int] = 2
+    """So many first holds under load begin a growth that a cause of the catalogue makes: a drift, a set."""
 
     def chance(self, variant: Variant, facts: Facts) -> float:
         """Probability beforehand of one of its forms, given that something else acts."""
@@ -41,10 +44,10 @@ class Begun(Cause):
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
         """From each hold under load on but the first; what grows from there is a drift, at the last it only begins."""
-        since = [Variant(at=float(k), setting=str(k)) for k in facts.pushed[1:]]
+        since = [Variant(at=float(k), setting=str(k)) for k in facts.pushed]
         begins, grows = (
             [replace(form, label=label, width=width) for form in some]
-            for (label, width), some in zip(GROWS, (since, since[1:-1]), strict=True)
+            for (label, width), some in zip(GROWS, (since[1:], since[self.known : -1]), strict=True)
         )
         return (*begins, *grows)
 
@@ -91,6 +94,7 @@ class OtherLength(Begun):
 
     name = "begun.length"
     unit = "m"
+    known = 0
 
     def plausible(self, facts: Facts) -> float:
         """Two thousandths of the length."""

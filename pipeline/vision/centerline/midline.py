@@ -166,11 +166,13 @@ def measure_sections(
     across = normals(angle)
     width = place.sum(axis=1) + 2.0 * half_width
     step = edges.step[:, keep]
-    smooth_width = _running_median(width)
-    # half of what changes between two models that both have some right is the standard deviation of an edge by light
-    doubt = (0.5 * profiles.at(s, "shift")) ** 2 + (_ROUNDNESS * 2.0 * half_width) ** 2
+    # half of what changes between two models that both have some right is the standard deviation of an edge by light,
+    # and half of what it is broader than the other one
+    broader = profiles.at(s, "blur")
+    broader -= broader.min(axis=0)
+    doubt = 0.25 * (profiles.at(s, "shift") ** 2 + broader**2) + (_ROUNDNESS * 2.0 * half_width) ** 2
     trust = doubt[::-1] / doubt.sum(axis=0)
-    likely = float(np.average(smooth_width, weights=1.0 / doubt.sum(axis=0)))
+    likely, open_by = _cable_width(width, doubt, None if waves else diameter)
     inward = 0.5 * likely - half_width - place.T
     off = trust[0] * inward[0] - trust[1] * inward[1]
     # Both edges are moved alike: their distance stays what was measured.
@@ -188,13 +190,27 @@ def measure_sections(
         balance=2.0 * np.sqrt(trust[0] * trust[1]),
         waves=waves,
         caliper=caliper,
-        systematic_std=_systematic(profiles, s, caliper, doubt, diameter),
+        systematic_std=_systematic(profiles, s, caliper, doubt, diameter, open_by),
         share=float(np.mean(keep)),
         contrast=median(step),
         noise=median(profiles.noise),
         blur=median(profiles.blur),
         softest=float(profiles.blur.min(axis=0).max()),
     )
+
+
+def _cable_width(width: Array, doubt: Array, diameter: float | None) -> tuple[float, float]:
+    """The cable's width by sections (n,) and by its stated diameter, and the standard deviation of that, px.
+
+    One light falls on all sections, so that their errors ``doubt`` (2, n) do not average out. Where they differ by
+    more, some have other edges, as sure as these may seem, and none counts for more than that.
+    """
+    smooth = _running_median(width)
+    variance = doubt.sum(axis=0) + np.mean((smooth - median(smooth)) ** 2)
+    stated = 0.0 if diameter is None else (_WIDTH_PLAY * diameter) ** -2.0
+    likely = np.average(smooth, weights=1.0 / variance)
+    seen = np.mean(1.0 / variance)
+    return float((seen * likely + stated * (diameter or 0.0)) / (seen + stated)), float((seen + stated) ** -0.5)
 
 
 def _of_usual_width(width: Array) -> NDArray[np.bool_]:
@@ -251,10 +267,13 @@ def _consistent(
     return out, spread, good
 
 
-def _systematic(profiles: Profiles, s: Array, width: float, doubt: Array, diameter: float | None) -> float:
+def _systematic(
+    profiles: Profiles, s: Array, width: float, doubt: Array, diameter: float | None, open_by: float
+) -> float:
     """Standard deviation, px, of the slow sideways error of the midline; see the module's text.
 
-    Edges count by the shares with which they make the midpoint; ``doubt`` (2, n) are their variances by the light.
+    Edges count by the shares with which they make the midpoint; ``doubt`` (2, n) are their variances by the light,
+    ``open_by`` (px) is the standard deviation of the width.
     """
     trust = doubt[::-1] / doubt.sum(axis=0)
     balance, lead = 2.0 * np.sqrt(trust[0] * trust[1]), trust[1] - trust[0]
@@ -266,7 +285,7 @@ def _systematic(profiles: Profiles, s: Array, width: float, doubt: Array, diamet
     by_model = share * np.sqrt(np.mean((trust[1] * shift[1] - trust[0] * shift[0] - 0.5 * common * lead) ** 2))
     by_blur = 0.5 * np.sqrt(np.mean((balance * np.diff(blur, axis=0)[0]) ** 2))
     # Where one edge counts alone, half the error of the cable's width is the midpoint's; ``doubt`` is half the change.
-    by_likely = 0.5 * min(2.0 * share, 1.0) * np.sqrt(np.mean(lead**2) / np.mean(1.0 / doubt.sum(axis=0)))
+    by_likely = 0.5 * min(2.0 * share, 1.0) * open_by * np.sqrt(np.mean(lead**2))
     one, two = medians(profiles.step, axis=1)
     unequal = float(abs(two - one) / (0.5 * (two + one)))
     missing = 0.0 if diameter is None else abs(width - diameter)
