@@ -30,12 +30,12 @@ from functools import cached_property
 from typing import Literal, Protocol, TypeGuard
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rod.array import Array
 from rod.moment_curve import MomentCurve as MomentCurve
 from rod.spline import Cardinal, cardinal, evaluate, slope
 
-Array = NDArray[np.float64]
 Reading = Literal["tangent", "secant"]
 Abscissa = Literal["curvature", "excess"]
 

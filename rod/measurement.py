@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rod.array import Array
+
 SlowErrors = tuple[tuple[float, float], ...]
 """Standard deviation and correlation length of errors that no averaging of neighbours reduces."""
 

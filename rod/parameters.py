@@ -31,8 +31,9 @@ from functools import cached_property
 
 import numpy as np
 
+from rod.array import Array
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, MomentCurve, parametric
+from rod.characteristic import MomentCurve, parametric
 
 
 @dataclass(frozen=True, eq=False)

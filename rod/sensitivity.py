@@ -23,8 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rod.array import Array
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, parametric
+from rod.characteristic import parametric
 from rod.equilibrium import Equilibrium
 from rod.parameters import Directions, Parameter, directions
 from rod.reduction import Balance, EdgeState, System

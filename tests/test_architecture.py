@@ -11,6 +11,7 @@ LONGEST_FILE = 400
 
 # From left to right: a room may import itself and anything to its left. Rooms in one tuple do not see each other.
 ROD = [
+    ("array",),
     ("measurement", "measured_law", "spline", "moment_curve"),
     ("midline",),
     ("characteristic", "compliance_law"),

@@ -25,6 +25,7 @@ from enum import Enum
 
 import numpy as np
 
+from rod.array import Array
 from rod.balance.moment_points import CommonErrors, MomentPoints, moment_points
 from rod.balance.moment_regression import (
     BOW_TERMS,
@@ -35,7 +36,7 @@ from rod.balance.moment_regression import (
     uniform_at_rest,
 )
 from rod.compliance_law import moment_basis
-from rod.measured_law import POINTS, Array, MeasuredLaw, Source, propagated
+from rod.measured_law import POINTS, MeasuredLaw, Source, propagated
 from rod.measurement import MeasuredTest
 
 CONTRADICTION = 2.0

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.bending_test import BendingTest
 from rod.characteristic import ParametricCurve
 from rod.compliance_law import moment_basis
@@ -26,8 +27,6 @@ from rod.inverse.camera import DISTORTED, axes_off, scaled, tilt_of
 from rod.inverse.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_photographed
 from rod.inverse.prediction import Facts, Model, Observer, Prediction
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 ELEMENTS = 120
 """Of the simulated cable: its force is right to 1e-4, a thirtieth of a load cell's."""

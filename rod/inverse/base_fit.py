@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.compliance_law import COEFFICIENTS, ComplianceLaw, refreshed
 from rod.inverse.base import ELEMENTS, Base, bent_at_rest, start
 from rod.inverse.extension import Extension
@@ -24,8 +24,6 @@ from rod.inverse.observation import DISPLACEMENT_STD, SHAPE_FUNCTIONS, Observati
 from rod.inverse.prediction import Facts
 from rod.measurement import MeasuredTest
 from rod.stiffness_law import StiffnessLaw
-
-Array = NDArray[np.float64]
 
 
 class BaseFit(NamedTuple):

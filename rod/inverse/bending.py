@@ -11,16 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.cause import Profile
 from rod.inverse.extension import Extension
 from rod.inverse.prediction import Facts, Model, end_for_end
 from rod.inverse.simulation import Run, base_derivatives, freedom
 from rod.parameters import Parameter, Toward, comparable
 from rod.sensitivity import Derivatives
-
-Array = NDArray[np.float64]
 
 SHORT = 1e-3
 """Of the step of a difference quotient: what is compared is what goes into a simulation, which is right to rounding."""

@@ -23,6 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
+from rod.array import Array
 from rod.compliance_law import ComplianceLaw
 from rod.equilibrium import Outcome
 from rod.inverse.base import ELEMENTS, measured_curvatures
@@ -33,7 +34,7 @@ from rod.inverse.laws import FreeLaw
 from rod.inverse.mean_law import linearised, mean_law, moved_by_forces, rows_posterior, weights
 from rod.inverse.observation import KINDS, ZERO_STD, Observation
 from rod.inverse.prediction import facts_of
-from rod.measured_law import POINTS, Array, MeasuredLaw, propagated
+from rod.measured_law import POINTS, MeasuredLaw, propagated
 from rod.measurement import MeasuredStep, MeasuredTest
 from rod.midline import LEAST_SECTIONS
 

@@ -17,14 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.extension import Extension
 from rod.inverse.observation import DISPLACEMENT_STD, Observation
 from rod.inverse.prediction import Model
 from rod.inverse.sensitivities import sensitivities, whole_residual
 from rod.inverse.simulation import Run, run
 from rod.inverse.step import Linearised, lasting, reach
-
-Array = NDArray[np.float64]
 
 ITERATIONS, TOLERANCE = 15, 1e-3
 """Gauss-Newton steps at most, where three to five are usual; change of chi-square at which a fit is done."""

@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from rod.array import Array
 from rod.measurement import MeasuredStep
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,15 +13,13 @@ from functools import cached_property
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
+from rod.array import Array
 from rod.characteristic import Characteristic, ParametricCurve
 from rod.compliance_law import ComplianceLaw, LawBasis, moment_basis, refreshed
 from rod.law_prior import TAUS, Family, priors
 from rod.stiffness_law import StiffnessLaw
-
-Array = NDArray[np.float64]
 
 COEFFICIENTS = 16
 """Of log f_EI: enough for a law of any form about which causes are weighed."""

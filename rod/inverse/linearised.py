@@ -15,10 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.observation import Observation, foot_points, of_hold
 from rod.inverse.prediction import Prediction
-
-Array = NDArray[np.float64]
 
 
 class _Nodes(NamedTuple):

@@ -16,13 +16,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.base_fit import laid_along
 from rod.inverse.fit import Fit, evaluated
 from rod.inverse.laws import Abscissa, AnyLaw
 from rod.inverse.observation import Observation, of_hold
 from rod.law_prior import Posterior, averaged, priors
-
-Array = NDArray[np.float64]
 
 LAYINGS, MOVES, SETTLED = 3, 6, 0.05
 """Times that the abscissa is laid along the law found, steps to the mean on each, and the standard deviations by which

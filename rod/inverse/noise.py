@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from rod.array import Array
 from rod.measurement import MeasuredShape, slow_covariance
 from rod.midline import Midline
-
-Array = NDArray[np.float64]
 
 STRETCHES = (0.35, 0.5, 0.64, 0.8, 1.0, 1.25, 1.6, 2.1, 2.8, 3.6, 4.5)
 """Trial factors of the stated correlation length; a grid of ratio 1.7 chose 0.6 where 0.8 was likeliest and put the

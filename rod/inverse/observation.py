@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from rod.array import Array
 from rod.inverse.common_errors import CommonErrors, common_errors
 from rod.inverse.force_noise import common_rounding, force_noise
 from rod.inverse.noise import (
@@ -35,8 +36,6 @@ from rod.inverse.noise import (
 from rod.inverse.prediction import Prediction
 from rod.measurement import MeasuredTest
 from rod.midline import BLOCKS, LEAST_SECTIONS, NOWHERE, Midline, midline
-
-Array = NDArray[np.float64]
 
 HOLD_NOISE_LEVEL = 1e-3
 """Probability; holds have noise levels of their own only if equality is refuted at this level."""

@@ -13,13 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.bending_test import BendingTest
 from rod.equilibrium import Branch
 from rod.measurement import MeasuredStep, MeasuredTest
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

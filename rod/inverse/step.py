@@ -13,12 +13,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from rod.array import Array
 from rod.inverse.extension import Extension
-
-Array = NDArray[np.float64]
 
 LAW_REACH = 0.7
 """Logarithm by which one step may move an unknown of the law at most: a factor two."""

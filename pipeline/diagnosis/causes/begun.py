@@ -15,13 +15,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.law import multiplied
+from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model
-
-Array = NDArray[np.float64]
 
 SHARE = 0.25
 """Of the probability of something else beforehand: of what begins between two holds, and of unknown forces."""

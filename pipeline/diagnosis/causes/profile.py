@@ -17,12 +17,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from rod.inverse.cause import Cause, Profile, Variant
 from rod.inverse.prediction import Facts, Model
-
-Array = NDArray[np.float64]
 
 PLACES = (0.15, 0.325, 0.5, 0.675, 0.85)
 SPOT_WIDTH = 0.07

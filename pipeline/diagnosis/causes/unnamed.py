@@ -21,14 +21,12 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.begun import BEGUN, SHARE, Begun, joints, with_rest
+from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.extension import Term
 from rod.inverse.prediction import Facts, Model
-
-Array = NDArray[np.float64]
 
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Of the largest force, moment or bend, their standard deviation: steps of a factor 3.3, over which a normal density

@@ -10,15 +10,13 @@ that nothing asks for stay at zero, and whether waves are likelier than a few fo
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import deviation, position_of, profile, wave
+from pipeline.records import Array
 from rod.inverse.extension import Extension, Term
 from rod.inverse.fit import Fit, fit_from
 from rod.inverse.observation import Observation
-
-Array = NDArray[np.float64]
 
 WAVES = 24
 """Of a sharp step of K0 by 3 1/m, 24 leave waves of 0.5 um across the cable: a twentieth of a pixel's tenth, below what

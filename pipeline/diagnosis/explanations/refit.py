@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.search import TRACE, Suspicion
 from pipeline.diagnosis.posterior.products import WORSE
+from pipeline.records import Array
 from rod.inverse.extension import Extension, Term
 from rod.inverse.fit import FAR, Fit, State, fit_from, shown
 from rod.inverse.observation import Observation
-
-Array = NDArray[np.float64]
 
 SHARES = (1.0, 0.3, 0.1)
 """Of a linear estimate, tried before a refit."""

@@ -14,15 +14,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from pipeline.result import CauseForm, Curve
 from rod.inverse.base_fit import law_of
 from rod.inverse.estimate import by_parameters
 from rod.inverse.fit import Fit
 from rod.measured_law import POINTS
-
-Array = NDArray[np.float64]
 
 
 def visited(fitted: Fit) -> tuple[float, float]:

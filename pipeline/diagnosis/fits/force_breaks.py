@@ -30,11 +30,9 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.faults import Faults, ForceCorrection
 from pipeline.messages import Message
-from pipeline.records import Finding, Level, doubtful
+from pipeline.records import Array, Finding, Level, doubtful
 from rod.inverse.fit import fit
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 FAULT = 6.0
 """Standard deviations: what is this far from what all other data say is a fault, and no chance."""

@@ -12,16 +12,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from pipeline.records import Array
 from rod.inverse.fit import Fit
 from rod.inverse.noise import section_covariance
 from rod.inverse.observation import KINDS, Observation, normal_distance
 from rod.inverse.photo_fit import photo_fit
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 COLUMNS = 24
 """Cells of the map along the cable: each averages four section blocks."""

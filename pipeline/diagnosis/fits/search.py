@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score
+from pipeline.records import Array
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
 from rod.inverse.observation import Observation
 from rod.inverse.sensitivities import whole_residual
 from rod.inverse.simulation import run
-
-Array = NDArray[np.float64]
 
 VISIBLE = 1e-3
 """Surviving fraction below which a cause counts as invisible."""

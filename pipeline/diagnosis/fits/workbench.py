@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS, Cause
 from pipeline.diagnosis.fits.extended import stiffness_change_linear
@@ -24,8 +23,6 @@ from rod.inverse.fit import Fit
 from rod.inverse.observation import ZERO_STD, Observation
 from rod.inverse.prediction import Facts, facts_of
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 SCATTER = 1e-5
 """Of a displacement under load, m: a dial gauge or a spindle is read to so much, where photos tell the travel of a step

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.fits.extended import curve
@@ -22,6 +21,7 @@ from pipeline.diagnosis.posterior.detectable import Detectable, detectable
 from pipeline.diagnosis.posterior.error_grid import error_grid
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 from pipeline.messages import DECIMAL, PER, Message, ended, entry, word
+from pipeline.records import Array
 from pipeline.result import Curve
 from pipeline.result.visited import html_table
 from pipeline.rounding import plain
@@ -36,8 +36,6 @@ from rod.inverse.observation import observe
 from rod.inverse.prediction import Facts
 from rod.inverse.simulation import run
 from rod.laws import StickSlip
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

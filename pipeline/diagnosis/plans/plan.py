@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from rod.inverse.prediction import Facts
 from rod.inverse.simulation import Run
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

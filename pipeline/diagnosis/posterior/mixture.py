@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp, ndtr
 
 from pipeline.diagnosis.fits.extended import factor_of, stated
@@ -24,10 +23,9 @@ from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import SIZES, as_told, moments
 from pipeline.diagnosis.posterior.hypotheses import LEVEL, Posterior
+from pipeline.records import Array
 from pipeline.result import Curve, Widening, visited
 from rod.inverse.fit import Fit
-
-Array = NDArray[np.float64]
 
 NEGLIGIBLE = 0.002
 """Probability of a hypothesis or an error model that is left out; the band lets 5 % lie outside."""

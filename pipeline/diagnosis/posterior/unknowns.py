@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.products import Models, Products
+from pipeline.records import Array
 from rod.inverse.fit import Fit
 from rod.law_prior import Conditioned, conditioned, inverse_root, least
-
-Array = NDArray[np.float64]
 
 NOTHING = 20.0
 """Of log p: what lies so far below the largest is nothing whatever the prior of an amount makes of it."""

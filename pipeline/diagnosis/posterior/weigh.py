@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.unnamed import UNNAMED
@@ -14,10 +13,9 @@ from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence, evidences
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
+from pipeline.records import Array
 from rod.inverse.fit import Fit
 from rod.inverse.prediction import Facts
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

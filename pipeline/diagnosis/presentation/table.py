@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.conclusion import Conclusion
@@ -21,11 +20,9 @@ from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.statistics.score import adjusted_p
 from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
 from pipeline.messages import entry
+from pipeline.records import Array
 from pipeline.result import BlindSpot, CauseRow, GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
-
-Array = NDArray[np.float64]
-
 
 TWINS_SHOWN = 8
 """Causes in the table of cosines; more cannot be read."""

@@ -19,11 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
-Array = NDArray[np.float64]
-
+from pipeline.records import Array
 
 SIGNIFICANT = 3.0
 """Standard deviations of a chi-square from which the base model has an excess that can be shared out."""

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, special
 
-Array = NDArray[np.float64]
+from pipeline.records import Array
 
 
 @dataclass(frozen=True)
