@@ -164,6 +164,11 @@ class MeasuredStep:
     picture: str | None = None
     chord_by_log: bool = False
 
+    @property
+    def samples(self) -> Array:
+        """The force samples of the hold, or the one force where there are none, (h,) N."""
+        return np.array([self.force]) if self.hold_forces is None else self.hold_forces
+
 
 @dataclass(frozen=True)
 class MeasuredTest:

@@ -129,16 +129,6 @@ class Directions:
         np.add.accumulate(self.edges, axis=1, out=vertices[:, 1:])
         return vertices
 
-    @cached_property
-    def lawful(self) -> bool:
-        """Whether any control point changes."""
-        return bool(self.ordinates.any())
-
-    @cached_property
-    def profiled(self) -> bool:
-        """Whether the stiffness profile changes."""
-        return bool(self.profile.any())
-
     def has(self, *names: str) -> bool:
         """Whether one of these numbers is a parameter."""
         return any(name in self.scalars for name in names)

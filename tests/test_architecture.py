@@ -67,7 +67,7 @@ INSIDE = {
         ("identified_again", "heldout", "force_breaks", "outlier"),
     ],
     "pipeline.diagnosis.posterior": [
-        ("explanation", "products", "words"),
+        ("explanation", "products"),
         ("error_grid",),
         ("unknowns",),
         ("evidence", "hypotheses"),

@@ -170,12 +170,10 @@ def _data_at_fault(bench: Workbench, known: Refits) -> Faults | None:
 
 def _causes_leave(bench: Workbench, most: float, known: Refits) -> bool:
     """Whether a cause or a pair of causes, refitted (scores are linear), leaves at most that chi-square."""
-    suspicion = bench.suspicion
-    for cause in candidates(suspicion)[:REFITTED]:
-        found = known_refits(bench.observation, bench.base, suspicion, cause, known, rival=most)
-        if any(one.fitted.chi2 <= most for one in found):
+    for cause in candidates(bench.suspicion)[:REFITTED]:
+        if any(one.fitted.chi2 <= most for one in known_refits(bench, cause, known, rival=most)):
             return True
-    hidden = hidden_pair(suspicion)
+    hidden = hidden_pair(bench.suspicion)
     return bool(hidden) and any(pair.fitted.chi2 <= most for pair in together(bench, hidden))
 
 

@@ -88,23 +88,11 @@ class BalanceGraph:
     varying: tuple[float, ...] = (0.0,) * BOW_TERMS
     checks: dict[str, float] = field(default_factory=dict)
 
-    @property
-    def measured(self) -> bool:
-        """True if there is a curve."""
-        return self.outcome is BalanceOutcome.MEASURED
-
 
 def balance(test: MeasuredTest) -> BalanceGraph:
     """Characteristic from moments ``P y`` and curvatures of all photos.
 
-    Parameters
-    ----------
-    test : MeasuredTest
-
-    Returns
-    -------
-    BalanceGraph
-        With an ``outcome`` other than ``MEASURED``, and no curve, where the data refuse.
+    With an ``outcome`` other than ``MEASURED``, and no curve, where the data refuse.
     """
     data = moment_points(test)
     if not any(points.force != 0.0 for points in data):

@@ -177,7 +177,7 @@ class Base:
             rows.extend(np.eye(size)[self.moved_at] / self.moved_std[:, None])
         if self.rig_std:
             rows.extend(np.eye(size)[self.rig_at] / np.array(self.rig_std)[:, None])
-        return np.vstack([*rows, np.pad(self.law.prior(), ((0, 0), (0, size - count)))])
+        return np.vstack([*rows, np.pad(self.law.prior, ((0, 0), (0, size - count)))])
 
     def _axis_rows(self) -> Array:
         """Prior (8, 8): each axis its own error, what the camera's foot moves alike, the parallax, and the camera."""

@@ -8,7 +8,7 @@ millionth of its range (`rod.parameters.Toward`): a cause says in `apply` what i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -157,7 +157,4 @@ def _of_number(bends: Bends, extension: Extension, vector: Array, base_model: Mo
 
 def _combined(d: Derivatives, change: Array) -> Derivatives:
     """Derivatives with respect to combinations (columns of ``change``) of the parameters."""
-    return Derivatives(
-        tuple(str(i) for i in range(change.shape[1])),
-        *(getattr(d, name) @ change for name in ("s", "x", "y", "theta", "kappa", "moment", "force", "chord")),
-    )
+    return Derivatives(*(getattr(d, one.name) @ change for one in fields(Derivatives)))

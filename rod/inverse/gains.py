@@ -81,7 +81,7 @@ def loaded_pre_curvature(
 ) -> tuple[float, float]:
     """K0 and its standard deviation, 1/m, without the photos of the steps ``rest``: a witness of its own."""
     at = fitted.extension.base.pre_curvature_index
-    value, J = linearised(observation, fitted, np.zeros((len(fitted.residual), 0)))
+    value, J = linearised(observation, fitted)
     count, kept = observation.rows.count, ~np.isin(observation.rows.step, list(rest))
     if kept.all():
         return float(fitted.vector[at]), float(np.sqrt(rows_posterior(fitted, value, J).covariance[at, at]))

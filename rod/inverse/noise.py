@@ -93,10 +93,6 @@ def calibrate_photo_noise(residuals: list[Array], sections: list[Midline], bases
         Normal distance of the block means from any smooth reference (the fitted cable).
     sections, bases : lists
         Per photo; bases (k, q) as of `smooth_basis`.
-
-    Returns
-    -------
-    PhotoNoise
     """
     turned = [linalg.qr(basis)[0] for basis in bases]
     split = [(q[:, : basis.shape[1]], q[:, basis.shape[1] :]) for q, basis in zip(turned, bases, strict=True)]

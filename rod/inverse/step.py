@@ -49,9 +49,8 @@ def lasting(extension: Extension, vector: Array) -> Bounds:
             least.append(-vector[at] / size)
         for j, name in enumerate(term.variant.tuned, start=at + 1):
             low, high = term.variant.range(name)
-            rows.extend(
-                [np.eye(1, extension.size, j)[0] / (high - low), -np.eye(1, extension.size, j)[0] / (high - low)]
-            )
+            unit = np.eye(1, extension.size, j)[0] / (high - low)
+            rows.extend([unit, -unit])
             least.extend([(low - vector[j]) / (high - low), (vector[j] - high) / (high - low)])
     return Bounds(np.array(rows).reshape(-1, extension.size), np.minimum(least, 0.0))
 

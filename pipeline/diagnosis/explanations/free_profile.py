@@ -15,7 +15,7 @@ from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import deviation, position_of, profile, wave
 from pipeline.records import Array
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import Fit, fit_from
+from rod.inverse.fit import Fit, fit
 from rod.inverse.observation import Observation
 
 WAVES = 24
@@ -40,7 +40,7 @@ def free_profile(observation: Observation, fitted: Fit, cause: Cause) -> list[Fi
         # nothing shows the cable at rest, and few forms that are far from the data leave the side of K0 to chance
         starts.append(np.r_[base.neutral(), vector[len(base.names) :]])
         starts[1][at] = -vector[at]
-    found = [fit_from(observation, extension, start, fitted) for start in starts]
+    found = [fit(observation, extension, start, near=fitted.run) for start in starts]
     return sorted((one for one in found if one.run.prediction is not None), key=lambda one: one.chi2)[:1]
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score
+from pipeline.diagnosis.statistics.twins import between_causes, cosines
 from pipeline.records import Array
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
@@ -62,6 +63,10 @@ class Suspicion:
     def of(self, cause: int) -> NDArray[np.int_]:
         """Directions of a cause."""
         return np.flatnonzero(self.owner == cause)
+
+    def closeness(self, of: NDArray[np.int_] | slice = slice(None)) -> Array:
+        """Largest ``|cos|`` (causes, causes) between the directions, all or some, of any two causes."""
+        return between_causes(cosines(self.scores.unit[:, of]), self.owner[of], len(self.causes))
 
     @property
     def usual(self) -> NDArray[np.int_]:

@@ -140,6 +140,5 @@ def scored(
 
 def _with_bends(fitted: Fit) -> Facts:
     """The test geometry with the largest bend that the cable had reached at each step, by the fitted model."""
-    rest = fitted.extension.base.pre_curvature(fitted.vector)
-    bends = [float(step.kappa.max()) - rest for step in fitted.run.steps]
+    bends = [float(step.kappa.max()) - fitted.pre_curvature for step in fitted.run.steps]
     return replace(fitted.extension.facts, bends=np.maximum.accumulate([0.0, *bends])[1:])

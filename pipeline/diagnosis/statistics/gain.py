@@ -40,15 +40,6 @@ class Fold:
     outside: Array
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Share of the excess misfit removed on held-out steps; ``excess`` is the base model's, in chi-square."""
-
-    removed: float
-    interval: tuple[float, float]
-    excess: float
-
-
 def folds_by_level(displacement: Array, branch: tuple[str, ...], *, same: float) -> list[list[int]]:
     """Steps grouped by displacement (closer than ``same``, m); the mounted step is never left out."""
     steps = [i for i in np.argsort(displacement, kind="stable") if branch[i] != "mounted"]
@@ -61,8 +52,8 @@ def folds_by_level(displacement: Array, branch: tuple[str, ...], *, same: float)
     return groups
 
 
-def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> HeldOut | None:
-    """Share of the excess removed over all folds, with its 95 % interval.
+def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> tuple[float, tuple[float, float]] | None:
+    """Share of the excess removed over all folds, and its 95 % interval.
 
     None where the base model's excess on them is within three standard deviations of chance: a share of nothing.
     """
@@ -83,7 +74,7 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
     base_chi2 = gained + along**2 + level**2 * rng.chisquare(max(count - 1, 1), draws)
     share = np.clip(gained / np.maximum(base_chi2 - count, 0.5 * excess), 0.0, 1.0)
     low, high = np.quantile(share, [0.025, 0.975])
-    return HeldOut(removed, (float(min(low, removed)), float(max(high, removed))), excess)
+    return removed, (float(min(low, removed)), float(max(high, removed)))
 
 
 def whitened_by_prediction(fold: Fold) -> tuple[Array, Array]:
