@@ -40,9 +40,6 @@ degree. Photos that are right to a hundredth of a pixel show that much; it chang
 EXACT = 1e-7
 """Relative standard deviation of a length that is stated as exact: below any photo's resolution."""
 
-PRESSED = 1e-3
-"""Of the length: least displacement of a loaded cable that a fit begins with."""
-
 MOVED = "displacement_"
 """Begin of the name of the error of a step's displacement; its index follows."""
 
@@ -333,8 +330,8 @@ def _first_error(test: MeasuredTest, facts: Facts, index: int, pre_curvature: fl
     if test.steps[index].displacement is not None or chord is None:
         return 0.0
     natural = test.length * float(np.sinc(0.5 * pre_curvature * test.length / np.pi))
-    # a cable that is seen longer than it is said to be is pressed all the same
-    return max(natural - chord, PRESSED * test.length) - float(facts.displacement[index])
+    # a cable that is seen longer than it is said to be is pressed all the same: by a thousandth of it at least
+    return max(natural - chord, 1e-3 * test.length) - float(facts.displacement[index])
 
 
 def measured_curvatures(test: MeasuredTest) -> tuple[Array, Array]:

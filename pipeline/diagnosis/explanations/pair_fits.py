@@ -79,9 +79,9 @@ def with_components(bench: Workbench, pair: Explanation) -> Explanation:
 
 
 def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanation]:
-    """The best pairs with sums of forms, and with profiles of any form."""
+    """The best two pairs, for the time that takes, with sums of forms, and with profiles of any form."""
     new: list[Explanation] = []
-    for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
+    for pair in sorted(found, key=lambda e: -e.worth)[:2]:
         fitted = [pair.fitted]
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
             if isinstance(kind, Profile):
@@ -109,7 +109,3 @@ def by_step(bench: Workbench, one: Explanation, *, hopeless: float = np.inf) -> 
             if fitted.run.prediction is not None:
                 found.append(explanation_of(one.causes, bench.base, fitted))
     return found
-
-
-IN_ANY_FORM = 2
-"""Pairs, the best first, that get forms with a place of their own; time."""

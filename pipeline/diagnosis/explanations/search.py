@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -239,17 +240,18 @@ class Search:
         found = tried((unknown.ways(facts, at, first) for at in everywhere), base)
         if not found:
             return
-        best, size = max(found, key=_rest), first
+        best, size = max(found, key=attrgetter("rest")), first
         place = unknown.place_of(best.terms)
         for other in larger if _beyond(best) else (smaller,):
-            there = max(tried([unknown.ways(facts, place, other)], _fit_of(best)), key=_rest, default=best)
+            others = tried([unknown.ways(facts, place, other)], _fit_of(best))
+            there = max(others, key=attrgetter("rest"), default=best)
             if there.rest <= best.rest:
                 break
             best, size = there, other
         if size != first:
             others = tried((unknown.ways(facts, at, size) for at in everywhere if at != place), base)
-            best = max([best, *others], key=_rest)
-        best = max([best, *tried(unknown.freer(best.terms), _fit_of(best))], key=_rest)
+            best = max([best, *others], key=attrgetter("rest"))
+        best = max([best, *tried(unknown.freer(best.terms), _fit_of(best))], key=attrgetter("rest"))
         if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
             tried(unknown.since(best.terms, facts), _fit_of(best))
 
@@ -277,10 +279,6 @@ class Search:
         believed = self.posterior
         beforehand = sum(SHARES[2]) + sum(something_else for _, something_else in SHARES.values())
         return believed.total(count=2) + believed.total(something_else=True) > beforehand
-
-
-def _rest(one: Hypothesis) -> float:
-    return one.rest
 
 
 def _fit_of(one: Hypothesis) -> Fit:

@@ -177,11 +177,7 @@ def stiffness_change_linear(fitted: Fit, columns: Array, amounts: Array) -> Arra
     moves = np.linalg.pinv(fitted.jacobian / size, rcond=1e-7) @ (columns * amounts) / size[:, None]
     low, high = visited(fitted)
     K = np.linspace(low, high, 60)
-    trial = 1e-3  # first order: a thousandth of the move, scaled up again
-    return np.array([_rms_change(fitted, fitted.vector, fitted.vector + trial * m, K) / trial for m in moves.T])
-
-
-def _rms_change(fitted: Fit, before: Array, after: Array, K: Array) -> float:
-    base = fitted.extension.base
-    f = [base.characteristic(v).tangent(K, base.pre_curvature(v)) for v in (before, after)]
-    return float(np.sqrt(np.mean((f[1] / f[0] - 1.0) ** 2)))
+    base, trial = fitted.extension.base, 1e-3  # first order: a thousandth of the move, scaled up again
+    vectors = [fitted.vector, *(fitted.vector + trial * move for move in moves.T)]
+    before, *after = (base.characteristic(v).tangent(K, base.pre_curvature(v)) for v in vectors)
+    return np.array([np.sqrt(np.mean((f / before - 1.0) ** 2)) / trial for f in after])

@@ -33,8 +33,6 @@ NEGLIGIBLE = 0.002
 COLUMNS = 4
 """Factors that carry the correlation along the curvature; log f_EI goes by few and smooth ones."""
 
-NORMAL = 1.96
-
 
 class _Parts(NamedTuple):
     """Components: weight (c,), mean (c, n + 1) beside the answer and factors of the covariance (c, n + 1, p)."""
@@ -90,7 +88,7 @@ def widening(
     weight = np.concatenate([part.weight for part in parts])
     mean = np.vstack([part.mean for part in parts])
     variance = np.vstack([np.sum(part.root**2, axis=2) for part in parts])
-    band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / NORMAL
+    band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / 1.96  # of a normal one
     # the curve's own band stands for what the same data leave unknown of its law
     known = np.einsum("np,pq,nq->n", here.rows, told, here.rows)
     extra = np.sqrt(np.maximum(band**2 - known, 0.0))

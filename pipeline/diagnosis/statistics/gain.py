@@ -23,9 +23,6 @@ from scipy import linalg
 
 from pipeline.records import Array
 
-SIGNIFICANT = 3.0
-"""Standard deviations of a chi-square from which the base model has an excess that can be shared out."""
-
 
 @dataclass(frozen=True, eq=False)
 class Fold:
@@ -61,7 +58,7 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> tupl
     before, after = (np.concatenate(residuals) for residuals in zip(*whitened, strict=True))
     count = len(before)
     excess = float(before @ before) - count
-    if excess <= SIGNIFICANT * np.sqrt(2.0 * count):
+    if excess <= 3.0 * np.sqrt(2.0 * count):
         return None
     removed = float(np.clip((float(before @ before) - float(after @ after)) / excess, 0.0, 1.0))
     # what the extension takes away is the signal; noise is drawn anew, as large as what it leaves
