@@ -29,7 +29,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rod.characteristic import Array, Characteristic, MomentCurve, Reading
+from rod.array import Array
+from rod.characteristic import Characteristic, MomentCurve, Reading
 from rod.discretisation import Along, Rod, joint_values
 from rod.equilibrium import Branch, Equilibrium, solve
 from rod.laws import Function, as_law

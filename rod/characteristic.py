@@ -30,12 +30,12 @@ from functools import cached_property
 from typing import Literal, Protocol, TypeGuard
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rod.array import Array
 from rod.moment_curve import MomentCurve as MomentCurve
 from rod.spline import Cardinal, cardinal, evaluate, slope
 
-Array = NDArray[np.float64]
 Reading = Literal["tangent", "secant"]
 Abscissa = Literal["curvature", "excess"]
 
@@ -126,10 +126,6 @@ class Characteristic(MomentCurve):
         """Coefficients of f."""
         return slope(self._primitive)
 
-    def _integral(self, u: Array) -> Array:
-        """Primitive of f at the abscissa (n,), N m."""
-        return evaluate(self._primitive, self._cardinal, u)
-
     def secant(self, K: ArrayLike, K0: ArrayLike) -> Array:
         """Secant reading m/(K - K0), N m^2, with its limit f(K0) at K = K0."""
         u, u0, D = self._arguments(K, K0)
@@ -148,7 +144,7 @@ class Characteristic(MomentCurve):
         One look-up of the segments, 12 microseconds for 100 points.
         """
         splines, excess, secant = self._cardinal, self.abscissa == "excess", self.reading == "secant"
-        table, rest = self._primitive.copy(), self._integral(np.zeros(1) if excess else K0)
+        table, rest = self._primitive.copy(), evaluate(self._primitive, splines, np.zeros(1) if excess else K0)
         uniform = rest.size == 1
         if uniform:
             table[0] -= rest

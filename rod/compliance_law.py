@@ -28,12 +28,11 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, CubicHermiteSpline
 
+from rod.array import Array
 from rod.moment_curve import LawOfBend, moment_curve
-
-Array = NDArray[np.float64]
 
 DEGREE = 3
 

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rod.characteristic import Array
+from rod.array import Array
 from rod.section import Memory, Section
 from rod.support import BEARING, Support
 

@@ -24,7 +24,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rod.characteristic import Array
+from rod.array import Array
 from rod.discretisation import Rod
 from rod.newton import PATH_STEPS, STEP_LIMIT, Outcome, Start, Trial, descended, judged, newton, tilted
 from rod.path import followed

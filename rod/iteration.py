@@ -23,7 +23,8 @@ from typing import Literal
 
 import numpy as np
 
-from rod.characteristic import Array, Characteristic
+from rod.array import Array
+from rod.characteristic import Characteristic
 from rod.discretisation import Rod
 from rod.equilibrium import Equilibrium, Outcome, solve
 from rod.reduction import Hold

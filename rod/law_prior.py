@@ -25,12 +25,10 @@ from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from rod.array import Array
 from rod.compliance_law import LawBasis, splines
-
-Array = NDArray[np.float64]
 
 REACH = 0.25
 """Of the abscissa: so far apart the log compliance of a rough law has forgotten itself."""

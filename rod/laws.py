@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from rod.characteristic import Array, Characteristic, MomentCurve
+from rod.array import Array
+from rod.characteristic import Characteristic, MomentCurve
 from rod.moment_curve import LawOfBend
 
 Function = Callable[[Array], ArrayLike]

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rod.array import Array
+
 SlowErrors = tuple[tuple[float, float], ...]
 """Standard deviation and correlation length of errors that no averaging of neighbours reduces."""
 
@@ -162,6 +163,11 @@ class MeasuredStep:
     displacement_std: float | None = None
     picture: str | None = None
     chord_by_log: bool = False
+
+    @property
+    def samples(self) -> Array:
+        """The force samples of the hold, or the one force where there are none, (h,) N."""
+        return np.array([self.force]) if self.hold_forces is None else self.hold_forces
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.measurement import MeasuredShape, SlowErrors, slow_covariance
-
-Array = NDArray[np.float64]
-
 
 LEAST_SECTIONS = 8
 """Raw midline points that make a shape."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.blas import idamax
 
-from rod.characteristic import Array
+from rod.array import Array
 from rod.reduction import Balance, System
 
 #: Newton stops when a whole step turns no edge by more than this, rad: the error left is of the order of its square.

@@ -29,16 +29,14 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from rod.array import Array
 from rod.bending_test import TABLE_1, TABLE_1_KNOTS, BendingTest, simulate, table_1
 from rod.characteristic import Reading
 from rod.equilibrium import Equilibrium, solve
 from rod.iteration import iterate
 from rod.paper_fit import PaperFit, Virtual, paper_fit
-
-Array = NDArray[np.float64]
 
 STEPS: Array = TABLE_1["step"] * np.arange(1.0, 4.0)
 READINGS: tuple[Reading, Reading] = ("secant", "tangent")

@@ -26,15 +26,14 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
+from rod.array import Array
 from rod.bending_test import BendingTest, simulate
 from rod.characteristic import Characteristic, Reading
 from rod.equilibrium import Equilibrium
 from rod.sensitivity import derivatives
-
-Array = NDArray[np.float64]
 
 PAPER_WEIGHT = 1e-3
 PAPER_START = (0.01, 1.0)

@@ -31,8 +31,9 @@ from functools import cached_property
 
 import numpy as np
 
+from rod.array import Array
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, MomentCurve, parametric
+from rod.characteristic import MomentCurve, parametric
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,16 +128,6 @@ class Directions:
         vertices = np.zeros((len(self.names), self.edges.shape[1] + 1))
         np.add.accumulate(self.edges, axis=1, out=vertices[:, 1:])
         return vertices
-
-    @cached_property
-    def lawful(self) -> bool:
-        """Whether any control point changes."""
-        return bool(self.ordinates.any())
-
-    @cached_property
-    def profiled(self) -> bool:
-        """Whether the stiffness profile changes."""
-        return bool(self.profile.any())
 
     def has(self, *names: str) -> bool:
         """Whether one of these numbers is a parameter."""

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from rod.characteristic import Array
+from rod.array import Array
 from rod.newton import (
     BEYOND_NUMBERS,
     PATH_STEPS,

@@ -30,7 +30,7 @@ import numpy as np
 from scipy.linalg.blas import idamax
 from scipy.linalg.lapack import dgesv, dgtsv, dptsv, dstebz, dsyev
 
-from rod.characteristic import Array
+from rod.array import Array
 from rod.discretisation import Rod
 from rod.section import Memory
 from rod.support import Support

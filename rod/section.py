@@ -33,7 +33,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.characteristic import Array, MomentCurve
+from rod.array import Array
+from rod.characteristic import MomentCurve
 
 Response = Callable[[Array], tuple[Array, Array]]
 

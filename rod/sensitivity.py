@@ -23,8 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rod.array import Array
 from rod.bending_test import BendingTest
-from rod.characteristic import Array, parametric
+from rod.characteristic import parametric
 from rod.equilibrium import Equilibrium
 from rod.parameters import Directions, Parameter, directions
 from rod.reduction import Balance, EdgeState, System
@@ -37,7 +38,6 @@ class Derivatives:
 
     Attributes
     ----------
-    names : (q,)
     s, x, y : (n, q) m per unit
     theta : (n, q) rad per unit
     kappa : (n, q) 1/m per unit
@@ -46,7 +46,6 @@ class Derivatives:
     chord : (q,) m per unit
     """
 
-    names: tuple[str, ...]
     s: Array
     x: Array
     y: Array
@@ -175,7 +174,7 @@ def _step(
     extent += system.softened(edge, dR[:, :, None])
     moment = balance.tangent * dK + given.moment
     x, y, theta, kappa, moment = rod.at_vertices(extent, dangles, dK, moment).transpose(0, 2, 1)
-    made = Derivatives(moves.names, moves.vertices[:, rod.shown].T, x, y, theta, kappa, moment, -dR[0], x[-1])
+    made = Derivatives(moves.vertices[:, rod.shown].T, x, y, theta, kappa, moment, -dR[0], x[-1])
     return made, _advanced(step, balance, moves, past, dangles, dK)
 
 
@@ -237,13 +236,13 @@ def _moment(step: Equilibrium, K: Array, moves: Directions, past: _Past) -> Arra
         by_read = law.moment_by_pre_curvature(read.at, K0) * move
         if read.by_set:
             by_read = by_read + law.tangent(read.at, K0) * (read.by_set * set_move + read.by_rest * move)
-        if moves.lawful and parametric(law):
+        if moves.ordinates.any() and parametric(law):
             by_read = by_read + moves.ordinates @ law.moment_by_parameters(read.at, K0).T
         for column, before, after, by in moves.laws:
             by_read[column] += (after.moment(read.at, K0) - before.moment(read.at, K0)) / by
         if section.profile is not None:
             by_read = section.profile * by_read
-        if moves.profiled:
+        if moves.profile.any():
             by_read = by_read + law.moment(read.at, K0) * moves.profile
         parts.append(by_read if read.share == 1.0 else read.share * by_read)
     if section.friction is not None:

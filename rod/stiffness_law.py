@@ -18,12 +18,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rod.array import Array
 from rod.compliance_law import ComplianceLaw, LawBasis
 from rod.moment_curve import LawOfBend, moment_curve
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

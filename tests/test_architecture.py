@@ -11,6 +11,7 @@ LONGEST_FILE = 400
 
 # From left to right: a room may import itself and anything to its left. Rooms in one tuple do not see each other.
 ROD = [
+    ("array",),
     ("measurement", "measured_law", "spline", "moment_curve"),
     ("midline",),
     ("characteristic", "compliance_law"),
@@ -66,7 +67,7 @@ INSIDE = {
         ("identified_again", "heldout", "force_breaks", "outlier"),
     ],
     "pipeline.diagnosis.posterior": [
-        ("explanation", "products", "words"),
+        ("explanation", "products"),
         ("error_grid",),
         ("unknowns",),
         ("evidence", "hypotheses"),

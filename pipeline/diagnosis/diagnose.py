@@ -65,7 +65,8 @@ def diagnose(
     reason = _not_to_be_compared(faults, identification)
     bench = reason or prepare(faults, settings)
     if isinstance(bench, Message):
-        return Diagnosed(_nothing_to_compare(bench), faults.findings, faults)
+        told = DiagnosisPart.told(Message("diagnosis.nothing", reason=bench))
+        return Diagnosed(DiagnosisPart(verdict="underpowered", **told), faults.findings, faults)
     refitted: Refits = {}
     fault = _data_at_fault(bench, refitted)
     if fault is not None:
@@ -170,12 +171,10 @@ def _data_at_fault(bench: Workbench, known: Refits) -> Faults | None:
 
 def _causes_leave(bench: Workbench, most: float, known: Refits) -> bool:
     """Whether a cause or a pair of causes, refitted (scores are linear), leaves at most that chi-square."""
-    suspicion = bench.suspicion
-    for cause in candidates(suspicion)[:REFITTED]:
-        found = known_refits(bench.observation, bench.base, suspicion, cause, known, rival=most)
-        if any(one.fitted.chi2 <= most for one in found):
+    for cause in candidates(bench.suspicion)[:REFITTED]:
+        if any(one.fitted.chi2 <= most for one in known_refits(bench, cause, known, rival=most)):
             return True
-    hidden = hidden_pair(suspicion)
+    hidden = hidden_pair(bench.suspicion)
     return bool(hidden) and any(pair.fitted.chi2 <= most for pair in together(bench, hidden))
 
 
@@ -187,8 +186,3 @@ def _item_at_fault(bench: Workbench, fitted: Fit) -> tuple[Faults, float] | None
     freedom = len(fitted.residual) - fitted.extension.size - item.rows
     fits = item.rest < freedom + 4.0 * np.sqrt(2.0 * freedom) + EXPLAINED * item.gain
     return (outlier_fault(bench.test, item), item.rest + item.rows) if fits else None
-
-
-def _nothing_to_compare(reason: Message) -> DiagnosisPart:
-    said = Message("diagnosis.nothing", reason=reason)
-    return DiagnosisPart(verdict="underpowered", **DiagnosisPart.told(said))

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from pipeline.diagnosis.causes.law import LAW
+from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
+from pipeline.diagnosis.explanations.refit import cost
 from pipeline.diagnosis.fits.heldout import measured_gain
 from pipeline.diagnosis.fits.search import suspect
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -28,9 +28,6 @@ from rod.inverse.laws import FewPoints
 from rod.inverse.observation import Observation, observe
 from rod.inverse.prediction import Facts, facts_of
 from rod.measurement import MeasuredTest
-
-POINT_GAIN = 16.0
-"""Chi-square that a form of the law or K0 must remove to be taken (4 sigma)."""
 
 
 @dataclass(frozen=True)
@@ -76,15 +73,7 @@ def papers_test(settings: DiagnosisSettings | None = None) -> MeasuredTest:
 def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) -> list[Discovery]:
     """Extend the straight cable of constant stiffness until forces and photos are explained.
 
-    Parameters
-    ----------
-    test : MeasuredTest
-    settings : DiagnosisSettings or None
-
-    Returns
-    -------
-    list of Discovery
-        In the order found; ends when neither extension is asked for.
+    In the order found; ends when neither extension is asked for.
     """
     settings = settings or DiagnosisSettings()
     faults = faults_of_input(test)
@@ -96,14 +85,14 @@ def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) ->
     found: list[Discovery] = []
     for data, observation in (("forces", forces), ("forces and photos", everything)):
         while not (bent and curved):
-            before = _fitted(faults.test, observation, facts, settings, curved=curved, bent=bent)
+            before = _fitted(faults.test, observation, facts, curved=curved, bent=bent)
             offers = {}
             if not curved:
-                offers[LAW] = _fitted(faults.test, observation, facts, settings, curved=True, bent=bent)
+                offers[LAW] = _fitted(faults.test, observation, facts, curved=True, bent=bent)
             if not bent:
-                offers["pre_curvature"] = _fitted(faults.test, observation, facts, settings, curved=curved, bent=True)
-            best = min(offers, key=lambda name: _cost(offers[name]))
-            if _cost(before) - _cost(offers[best]) < POINT_GAIN:
+                offers["pre_curvature"] = _fitted(faults.test, observation, facts, curved=curved, bent=True)
+            best = min(offers, key=lambda name: cost(offers[name]))
+            if cost(before) - cost(offers[best]) < SHAPE_GAIN:
                 break
             curved, bent = curved or best == LAW, bent or best == "pre_curvature"
             gain = _gain(faults.test, observation, facts, settings, before, offers[best])
@@ -122,36 +111,16 @@ def rediscover(test: MeasuredTest, settings: DiagnosisSettings | None = None) ->
     return found
 
 
-def _cost(fitted: Fit) -> float:
-    """Chi-square plus two for every parameter (Akaike): what more parameters remove by chance does not count."""
-    return fitted.chi2 + 2.0 * fitted.extension.size if fitted.run.prediction is not None else np.inf
-
-
-def _fitted(
-    test: MeasuredTest, observation: Observation, facts: Facts, settings: DiagnosisSettings, *, curved: bool, bent: bool
-) -> Fit:
+def _fitted(test: MeasuredTest, observation: Observation, facts: Facts, *, curved: bool, bent: bool) -> Fit:
     """The best fit of one of the four models, from three stiffnesses and, if bent, three pre-curvatures."""
-    base = start(
-        test,
-        facts,
-        points=3 if curved else 1,
-        straight=not bent,
-    )
+    base = start(test, facts, points=3 if curved else 1, straight=not bent)
     if not bent and isinstance(base.law, FewPoints):  # the control points then count from zero curvature
         knots = base.law.knots + (base.law.knots > 0.0) * base.first
         base = replace(base, law=replace(base.law, knots=knots))
-    best: Fit | None = None
-    for stiffness, bend in ((1.0, 0.0), (0.5, 0.0), (2.0, 0.1 * facts.curvature_scale)):
-        found = fit(
-            observation,
-            Extension(base, facts),
-            base.neutral(stiffness=stiffness, bend=bend),
-            iterations=2 * ITERATIONS,
-        )
-        if best is None or _cost(found) < _cost(best):
-            best = found
-    assert best is not None
-    return best
+    starts = (1.0, 0.0), (0.5, 0.0), (2.0, 0.1 * facts.curvature_scale)
+    vectors = (base.neutral(stiffness=stiffness, bend=bend) for stiffness, bend in starts)
+    fits = (fit(observation, Extension(base, facts), vector, iterations=2 * ITERATIONS) for vector in vectors)
+    return min(fits, key=cost)
 
 
 def _gain(

@@ -1,13 +1,38 @@
-"""The diagnosis in plain words: headline, and the page of `cablebend explain`."""
+"""The diagnosis in plain words: verdict, headline, and the page of `cablebend explain`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 from pipeline.diagnosis.causes import CATALOGUE, Cause
-from pipeline.diagnosis.posterior.words import Verdict
 from pipeline.messages import PER, Message, entry, word
 from pipeline.result import CausePart, CauseRow
+
+Verdict = Literal["adequate", "named", "class", "two_causes", "unexplained", "underpowered"]
+
+
+def verdict(*, found: bool, unmodelled: bool, classes: tuple[tuple[int, ...], ...], powerless: bool) -> Verdict:
+    """The verdict, a word of contract.md.
+
+    Parameters
+    ----------
+    found : bool
+        A cause, or something else, is likelier than the base model.
+    unmodelled : bool
+        Something else is.
+    classes : tuple of tuple of int
+        Names in the place of each cause.
+    powerless : bool
+        Effects of plausible size would not have been seen either.
+    """
+    if unmodelled:
+        return "unexplained"
+    if not found:
+        return "underpowered" if powerless else "adequate"
+    if len(classes) > 1:
+        return "two_causes"
+    return "named" if len(classes[0]) == 1 else "class"
 
 
 def headline(

@@ -14,7 +14,6 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from pipeline.faults.record import Faults
 from pipeline.faults.stuck_forces import stuck_forces
@@ -130,10 +129,7 @@ def _same_noise(one: MeasuredShape, other: MeasuredShape, share: float) -> bool:
 
 def _scatter(shape: MeasuredShape) -> float:
     """Root mean square distance of the sections from the smooth centerline, m."""
-    theta = np.interp(shape.section_s, shape.s, shape.theta)
-    dx = shape.section_x - CubicHermiteSpline(shape.s, shape.x, np.cos(shape.theta))(shape.section_s)
-    dy = shape.section_y - CubicHermiteSpline(shape.s, shape.y, np.sin(shape.theta))(shape.section_s)
-    return float(np.sqrt(np.mean((-np.sin(theta) * dx + np.cos(theta) * dy) ** 2)))
+    return float(np.sqrt(np.mean(shape.section_offsets() ** 2)))
 
 
 def _mismatch(found: Faults) -> dict[int, float]:

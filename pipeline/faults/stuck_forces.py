@@ -42,7 +42,7 @@ class _Hold(NamedTuple):
 
 def stuck_forces(steps: tuple[MeasuredStep, ...]) -> list[int]:
     """Indices of the loaded steps whose force stands still."""
-    samples = [np.array([s.force]) if s.hold_forces is None else s.hold_forces for s in steps]
+    samples = [step.samples for step in steps]
     loaded = [i for i, step in enumerate(steps) if step.branch != "mounted"]
     if len(loaded) < 2:
         return []

@@ -16,9 +16,9 @@ import numpy as np
 from scipy.special import chdtrc
 
 from pipeline.records import Array
+from rod.measured_law import POINTS
 
 PARTS = 3
-GRID = 61
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class LogCurve:
     def common_grid(self, other: LogCurve) -> Array | None:
         """Curvatures (n,) 1/m over what both visited; None if there is none."""
         low, high = max(self.kappa[0], other.kappa[0]), min(self.kappa[-1], other.kappa[-1])
-        return np.linspace(low, high, GRID) if high > low else None
+        return np.linspace(low, high, POINTS) if high > low else None
 
     def onto(self, grid: Array) -> Array:
         """Matrix of linear interpolation from the own grid to another, (n, own)."""

@@ -176,16 +176,8 @@ def agreement_part(found: Identification) -> AgreementPart:
     agreement = found.agreement
     if agreement is None:
         return AgreementPart(pre_curvature=sources)
-    return AgreementPart(
-        rms_relative=agreement.rms_relative,
-        max_relative=agreement.max_relative,
-        compatible=agreement.compatible,
-        p_value=agreement.p_value,
-        level=agreement.level,
-        range_per_m=agreement.range_per_m,
-        pre_curvature=sources,
-        hints=list(map(str, agreement.hints)),
-    )
+    hints = list(map(str, agreement.hints))
+    return AgreementPart(**vars(agreement) | {"pre_curvature": sources, "hints": hints})
 
 
 def _steps(found: Identification) -> list[StepPart]:

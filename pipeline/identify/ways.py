@@ -22,9 +22,6 @@ from rod.balance import balance
 from rod.inverse import Estimate, estimate
 from rod.measurement import MeasuredTest
 
-LEAST_PHOTOS = 2
-"""Photos of loaded steps that a branch needs to be fitted on its own."""
-
 
 def identify(faults: Faults, images: Mapping[int, str], settings: IdentifySettings) -> Identification:
     """Characteristic by both ways from what may be used of a test; its record keeps the whole test.
@@ -55,7 +52,7 @@ def _branches(test: MeasuredTest) -> dict[str, Estimate]:
     groups = {"loading": ("mounted", "loading"), "unloading": ("unloading",)}
     halves = {name: tuple(s for s in test.steps if s.branch in members) for name, members in groups.items()}
     photos = [sum(s.shape is not None and s.branch != "mounted" for s in steps) for steps in halves.values()]
-    if min(photos) < LEAST_PHOTOS:
+    if min(photos) < 2:  # of loaded steps, for a branch to be fitted on its own
         return {}
     apart = {name: estimate(replace(test, steps=steps)) for name, steps in halves.items()}
     return apart if all(e.law is not None for e in apart.values()) else {}

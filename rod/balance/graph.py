@@ -25,6 +25,7 @@ from enum import Enum
 
 import numpy as np
 
+from rod.array import Array
 from rod.balance.moment_points import CommonErrors, MomentPoints, moment_points
 from rod.balance.moment_regression import (
     BOW_TERMS,
@@ -35,7 +36,7 @@ from rod.balance.moment_regression import (
     uniform_at_rest,
 )
 from rod.compliance_law import moment_basis
-from rod.measured_law import POINTS, Array, MeasuredLaw, Source, propagated
+from rod.measured_law import POINTS, MeasuredLaw, Source, propagated
 from rod.measurement import MeasuredTest
 
 CONTRADICTION = 2.0
@@ -87,23 +88,11 @@ class BalanceGraph:
     varying: tuple[float, ...] = (0.0,) * BOW_TERMS
     checks: dict[str, float] = field(default_factory=dict)
 
-    @property
-    def measured(self) -> bool:
-        """True if there is a curve."""
-        return self.outcome is BalanceOutcome.MEASURED
-
 
 def balance(test: MeasuredTest) -> BalanceGraph:
     """Characteristic from moments ``P y`` and curvatures of all photos.
 
-    Parameters
-    ----------
-    test : MeasuredTest
-
-    Returns
-    -------
-    BalanceGraph
-        With an ``outcome`` other than ``MEASURED``, and no curve, where the data refuse.
+    With an ``outcome`` other than ``MEASURED``, and no curve, where the data refuse.
     """
     data = moment_points(test)
     if not any(points.force != 0.0 for points in data):

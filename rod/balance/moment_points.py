@@ -29,11 +29,10 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.linalg import solve_triangular
 from scipy.sparse import csr_array, diags_array
 
+from rod.array import Array
 from rod.compliance_law import ComplianceLaw
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
 from rod.midline import LEAST_SECTIONS, Midline, midline
-
-Array = NDArray[np.float64]
 
 CELLS = 400
 """Of the integral along the cable: where the law has a kink, it is in error by a third of a photo's noise."""

@@ -13,14 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from rod.array import Array
 from rod.balance.moment_points import CommonErrors, MomentPoints, Residual, residual
 from rod.compliance_law import ComplianceLaw, LawBasis, refreshed
 from rod.law_prior import Forms, Posterior, averaged, priors
-
-Array = NDArray[np.float64]
 
 BOW_TERMS = 4
 """Legendre terms of K0(s) - K0: a linear set from the spool, one and two bows, and a kink's rough place."""

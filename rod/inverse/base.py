@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.bending_test import BendingTest
 from rod.characteristic import ParametricCurve
 from rod.compliance_law import moment_basis
@@ -26,8 +27,6 @@ from rod.inverse.camera import DISTORTED, axes_off, scaled, tilt_of
 from rod.inverse.laws import COEFFICIENTS, AnyLaw, FewPoints, Law, as_photographed
 from rod.inverse.prediction import Facts, Model, Observer, Prediction
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 ELEMENTS = 120
 """Of the simulated cable: its force is right to 1e-4, a thirtieth of a load cell's."""
@@ -40,9 +39,6 @@ degree. Photos that are right to a hundredth of a pixel show that much; it chang
 
 EXACT = 1e-7
 """Relative standard deviation of a length that is stated as exact: below any photo's resolution."""
-
-PRESSED = 1e-3
-"""Of the length: least displacement of a loaded cable that a fit begins with."""
 
 MOVED = "displacement_"
 """Begin of the name of the error of a step's displacement; its index follows."""
@@ -178,7 +174,7 @@ class Base:
             rows.extend(np.eye(size)[self.moved_at] / self.moved_std[:, None])
         if self.rig_std:
             rows.extend(np.eye(size)[self.rig_at] / np.array(self.rig_std)[:, None])
-        return np.vstack([*rows, np.pad(self.law.prior(), ((0, 0), (0, size - count)))])
+        return np.vstack([*rows, np.pad(self.law.prior, ((0, 0), (0, size - count)))])
 
     def _axis_rows(self) -> Array:
         """Prior (8, 8): each axis its own error, what the camera's foot moves alike, the parallax, and the camera."""
@@ -334,8 +330,8 @@ def _first_error(test: MeasuredTest, facts: Facts, index: int, pre_curvature: fl
     if test.steps[index].displacement is not None or chord is None:
         return 0.0
     natural = test.length * float(np.sinc(0.5 * pre_curvature * test.length / np.pi))
-    # a cable that is seen longer than it is said to be is pressed all the same
-    return max(natural - chord, PRESSED * test.length) - float(facts.displacement[index])
+    # a cable that is seen longer than it is said to be is pressed all the same: by a thousandth of it at least
+    return max(natural - chord, 1e-3 * test.length) - float(facts.displacement[index])
 
 
 def measured_curvatures(test: MeasuredTest) -> tuple[Array, Array]:

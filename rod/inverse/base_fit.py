@@ -12,20 +12,18 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.compliance_law import COEFFICIENTS, ComplianceLaw, refreshed
 from rod.inverse.base import ELEMENTS, Base, bent_at_rest, start
 from rod.inverse.extension import Extension
-from rod.inverse.fit import CRAWL_FAR, ITERATIONS, Fit, fit, fit_from
+from rod.inverse.fit import CRAWL_FAR, ITERATIONS, Fit, fit
 from rod.inverse.laws import Abscissa, AnyLaw, FreeLaw, over_moments
 from rod.inverse.noise import calibrate_photo_noise
 from rod.inverse.observation import DISPLACEMENT_STD, SHAPE_FUNCTIONS, Observation, normal_distance, observe
 from rod.inverse.prediction import Facts
 from rod.measurement import MeasuredTest
 from rod.stiffness_law import StiffnessLaw
-
-Array = NDArray[np.float64]
 
 
 class BaseFit(NamedTuple):
@@ -82,7 +80,7 @@ def base_fit(
     valleys = [settled(observation, _first(observation, begun(), facts))]
     if facts.rest_side == "natural" and valleys[0].run.prediction is not None:
         # a cable bent to the other side at rest that has snapped over shows nearly the same shapes under load
-        bent = bent_at_rest(test) or abs(_rest(valleys[0]))
+        bent = bent_at_rest(test) or abs(valleys[0].pre_curvature)
         for side in (bent, -bent):
             one = settled(observation, _first(observation, begun(side), facts))
             valleys += [one] if one.run.prediction is not None and all(_apart(one, two) for two in valleys) else []
@@ -100,7 +98,7 @@ def base_fit(
         )
     here = fitted.extension, fitted.vector
     # laid along itself the law moves a little, and a cable that was about to snap over may do so
-    again = (fit_from(observation, *model, fitted) for model in (laid_along(fitted), here))
+    again = (fit(observation, *model, near=fitted.run) for model in (laid_along(fitted), here))
     fitted = next((found for found in again if found.run.prediction is not None), fitted)
     return BaseFit(observation, settled(observation, fitted))
 
@@ -115,15 +113,12 @@ def _first(observation: Observation, base: Base, facts: Facts) -> Fit:
     return min(found, key=_cost)
 
 
-def _rest(fitted: Fit) -> float:
-    return fitted.extension.base.pre_curvature(fitted.vector)
-
-
 def _apart(one: Fit, other: Fit) -> bool:
     """Whether a fit lies in another minimum: its K0 more than a standard deviation away, or its chi-square lower."""
     at = other.extension.base.pre_curvature_index
     assert at is not None  # only a photo at rest holds it
-    return bool((_rest(one) - _rest(other)) ** 2 > other.covariance[at, at] or one.chi2 < other.chi2 - 1.0)
+    apart = (one.pre_curvature - other.pre_curvature) ** 2 > other.covariance[at, at]
+    return bool(apart or one.chi2 < other.chi2 - 1.0)
 
 
 def _cost(fitted: Fit) -> float:
@@ -144,7 +139,7 @@ def settled(observation: Observation, fitted: Fit) -> Fit:
         if fitted.run.prediction is None:
             break
         start = laid_along(fitted) if fitted.converged else (fitted.extension, fitted.vector)
-        further = fit_from(observation, *start, fitted)
+        further = fit(observation, *start, near=fitted.run)
         gained = fitted.chi2 - _cost(further)
         if gained > 0.0:
             fitted = further
@@ -184,7 +179,7 @@ def held_to(observation: Observation, fitted: Fit, scatter: float, rig: tuple[fl
     other = replace(base, moved=tuple(moved.tolist()), moved_std=std[moved], moved_first=errors[moved], rig_std=known)
     fresh = np.zeros(len(known) - len(base.rig_std))
     start = np.r_[fitted.vector[: at.start], errors[moved], fresh, fitted.vector[at.stop :]]
-    found = fit_from(observation, replace(extension, base=other), start, fitted)
+    found = fit(observation, replace(extension, base=other), start, near=fitted.run)
     return fitted if found.run.prediction is None else found
 
 

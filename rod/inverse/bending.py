@@ -8,19 +8,17 @@ millionth of its range (`rod.parameters.Toward`): a cause says in `apply` what i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.cause import Profile
 from rod.inverse.extension import Extension
 from rod.inverse.prediction import Facts, Model, end_for_end
 from rod.inverse.simulation import Run, base_derivatives, freedom
 from rod.parameters import Parameter, Toward, comparable
 from rod.sensitivity import Derivatives
-
-Array = NDArray[np.float64]
 
 SHORT = 1e-3
 """Of the step of a difference quotient: what is compared is what goes into a simulation, which is right to rounding."""
@@ -159,7 +157,4 @@ def _of_number(bends: Bends, extension: Extension, vector: Array, base_model: Mo
 
 def _combined(d: Derivatives, change: Array) -> Derivatives:
     """Derivatives with respect to combinations (columns of ``change``) of the parameters."""
-    return Derivatives(
-        tuple(str(i) for i in range(change.shape[1])),
-        *(getattr(d, name) @ change for name in ("s", "x", "y", "theta", "kappa", "moment", "force", "chord")),
-    )
+    return Derivatives(*(getattr(d, one.name) @ change for one in fields(Derivatives)))

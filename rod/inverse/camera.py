@@ -10,11 +10,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.prediction import Facts, Observer, Prediction
-
-Array = NDArray[np.float64]
 
 DISTORTED = 0.01
 """Radial distortion at half the picture's diagonal by a common zoom lens."""

@@ -12,11 +12,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.prediction import Facts, Model
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.noise import light_alike
 from rod.measurement import slow_covariance
 from rod.midline import Midline
-
-Array = NDArray[np.float64]
 
 LEAST = 1e-3
 """Variance, in units of that of each photo's noise, below which what photos share is nothing."""

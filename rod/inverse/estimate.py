@@ -23,6 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
+from rod.array import Array
 from rod.compliance_law import ComplianceLaw
 from rod.equilibrium import Outcome
 from rod.inverse.base import ELEMENTS, measured_curvatures
@@ -33,7 +34,7 @@ from rod.inverse.laws import FreeLaw
 from rod.inverse.mean_law import linearised, mean_law, moved_by_forces, rows_posterior, weights
 from rod.inverse.observation import KINDS, ZERO_STD, Observation
 from rod.inverse.prediction import facts_of
-from rod.measured_law import POINTS, Array, MeasuredLaw, propagated
+from rod.measured_law import POINTS, MeasuredLaw, propagated
 from rod.measurement import MeasuredStep, MeasuredTest
 from rod.midline import LEAST_SECTIONS
 
@@ -131,7 +132,9 @@ class Estimate:
         if self.fitted is None:
             return {}
         base, vector = self.fitted.extension.base, self.fitted.vector
-        known = np.linalg.inv(base.prior[: base.known].T @ base.prior[: base.known] + _nowhere(base.law.size, vector))
+        # of law and K0 nothing is known: a precision of theirs lets that of all others be inverted
+        open_ones = np.diag((np.arange(vector.size) <= base.law.size).astype(float))
+        known = np.linalg.inv(base.prior[: base.known].T @ base.prior[: base.known] + open_ones)
         found = {}
         for name in (*base.axes, "scale", "length"):
             at = base.names.index(name)
@@ -151,11 +154,6 @@ class Estimate:
             own = (rows.kind == KINDS.index(kind)) & ((rows.step == step) if step is not None else True)
             value = self.fitted.residual[: rows.count][own]
         return float(value @ value), value.size
-
-
-def _nowhere(law: int, vector: Array) -> Array:
-    """A precision for law and K0, of which nothing is known, so that that of all others can be inverted."""
-    return np.diag((np.arange(vector.size) <= law).astype(float))
 
 
 def estimate(
@@ -229,11 +227,6 @@ def _without(found: BaseFit, step: int) -> float:
     return float(fitted.residual[row] ** 2 / max(1.0 - known, 1e-9))  # a row that alone tells K0 contradicts nothing
 
 
-def _tells(step: MeasuredStep) -> bool:
-    """Whether a step says something about the cable: a photo, or the force at a displacement."""
-    return _shown(step) or (step.branch != "mounted" and step.displacement is not None)
-
-
 def _shown(step: MeasuredStep) -> bool:
     return step.shape is not None and step.shape.section_s.size >= LEAST_SECTIONS
 
@@ -244,7 +237,8 @@ def _driven(test: MeasuredTest) -> tuple[MeasuredTest, MeasuredStep | None]:
     Chords of photos drive, so that a wrong zero of the log moves nothing. The chord of a step without a photo is that
     of the log, whose zero the photos of the others tell. A force is that of its photo, whatever it does in the hold.
     """
-    steps = [step for step in test.steps if _tells(step)]
+    # of the cable tells a photo, or the force at a displacement
+    steps = [s for s in test.steps if _shown(s) or (s.branch != "mounted" and s.displacement is not None)]
     loaded = [step for step in steps if _shown(step) and step.displacement is not None]
     zeros = np.array([_chord(step) + (step.displacement or 0.0) for step in loaded])
     scatter = float(zeros.std(ddof=1)) if zeros.size > 1 else 0.0
@@ -278,8 +272,8 @@ def _chord(step: MeasuredStep) -> float:
 def _read_off(test: MeasuredTest, observation: Observation, fitted: Fit, rest: frozenset[int]) -> Estimate:
     """Curves on the visited range with bands by propagation."""
     base, size = fitted.extension.base, fitted.extension.size
-    law, K0 = law_of(fitted), base.pre_curvature(fitted.vector)
-    posterior = rows_posterior(fitted, *linearised(observation, fitted, np.zeros((len(fitted.residual), 0))))
+    law, K0 = law_of(fitted), fitted.pre_curvature
+    posterior = rows_posterior(fitted, *linearised(observation, fitted))
     errors = [np.array([each.get(step.step, 0.0) for step in test.steps]) for each in test.common_force_errors]
     by_forces = moved_by_forces(observation, fitted, posterior.covariance, errors)
     covariance = posterior.covariance + by_forces @ by_forces.T
@@ -319,7 +313,7 @@ def _read_off(test: MeasuredTest, observation: Observation, fitted: Fit, rest: f
 def by_parameters(fitted: Fit, K: Array) -> tuple[Array, Array]:
     """Derivatives (n, p) of log f_EI and of the moment (N m) at curvatures (n,) 1/m by the vector of a fit."""
     base, law = fitted.extension.base, law_of(fitted)
-    K0, own, bend = base.pre_curvature(fitted.vector), law.parameters, base.pre_curvature_index
+    K0, own, bend = fitted.pre_curvature, law.parameters, base.pre_curvature_index
     by_log, by_moment = np.zeros((2, len(K), fitted.extension.size))
     by_log[:, :own] = law.log_tangent_by_parameters(K, K0)
     by_moment[:, :own] = law.moment_by_parameters(K, K0)

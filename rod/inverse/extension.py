@@ -13,13 +13,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.base import Base
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model, end_for_end
-
-Array = NDArray[np.float64]
 
 STEP = 1e-3
 """Of a plausible amount, or of the range of a place: step of a difference quotient."""

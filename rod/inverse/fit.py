@@ -17,14 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.extension import Extension
 from rod.inverse.observation import DISPLACEMENT_STD, Observation
 from rod.inverse.prediction import Model
 from rod.inverse.sensitivities import sensitivities, whole_residual
 from rod.inverse.simulation import Run, run
 from rod.inverse.step import Linearised, lasting, reach
-
-Array = NDArray[np.float64]
 
 ITERATIONS, TOLERANCE = 15, 1e-3
 """Gauss-Newton steps at most, where three to five are usual; change of chi-square at which a fit is done."""
@@ -111,6 +110,11 @@ class Fit:
         K0, first = rod.section.pre_curvature, 1 - rod.shown.start
         return np.concatenate([(step.kappa[first : first + K0.size] - K0)[2:-2] for step in self.run.steps])
 
+    @property
+    def pre_curvature(self) -> float:
+        """K0, 1/m."""
+        return self.extension.base.pre_curvature(self.vector)
+
     def amount(self, term: int) -> tuple[float, float]:
         """Amount of a term and its standard deviation."""
         at = self.extension.amounts_at[term]
@@ -160,7 +164,7 @@ def fit(
         begin, state = start, State(start.vector, extension.base_model(start.vector), start.run, start.residual)
     else:
         state = start if isinstance(start, State) else shown(observation, extension, np.asarray(start, float), near)
-        begin = _with_jacobian(observation, extension, state)
+        begin = evaluated(observation, extension, state)
         if state.run.prediction is None:
             return begin
     jacobian = begin.jacobian
@@ -196,18 +200,6 @@ def fit(
     return Fit(extension, state.vector, state.run, state.residual, jacobian, converged)
 
 
-def fit_from(
-    observation: Observation,
-    extension: Extension,
-    start: Array | State,
-    near: Fit,
-    *,
-    hopeless: float = np.inf,
-) -> Fit:
-    """A fit whose equilibria are sought from those of a fitted neighbour; see `fit`."""
-    return fit(observation, extension, start, near=near.run, hopeless=hopeless)
-
-
 class State(NamedTuple):
     """A model at a vector (p,): without its terms, its run, and the residual (N,), of no length without equilibrium."""
 
@@ -233,12 +225,8 @@ def shown(
     return State(vector, base_model, here, np.zeros(0) if value is None else value)
 
 
-def evaluated(observation: Observation, extension: Extension, vector: Array, near: Run | None) -> Fit:
-    """The model at a vector (p,), not fitted; without residual and Jacobian where it has no equilibrium there."""
-    return _with_jacobian(observation, extension, shown(observation, extension, vector, near))
-
-
-def _with_jacobian(observation: Observation, extension: Extension, at: State) -> Fit:
+def evaluated(observation: Observation, extension: Extension, at: State) -> Fit:
+    """The model in a state, not fitted; without residual and Jacobian where it has no equilibrium there."""
     jacobian = np.zeros((0, extension.size))
     if at.run.prediction is not None:
         jacobian = sensitivities(observation, extension, at.vector, at.base_model, at.run)

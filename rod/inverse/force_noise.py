@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from rod.array import Array
 from rod.measurement import MeasuredStep
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def force_noise(steps: tuple[MeasuredStep, ...], *, floor: float, distinct: floa
     plain = _scatter(steps, None)
     if not plain.freedom.any():
         # stated is what the force of a hold is known to
-        samples = [1 if step.hold_forces is None else len(step.hold_forces) for step in steps]
+        samples = [len(step.samples) for step in steps]
         return ForceNoise(np.maximum([step.force_std for step in steps] * np.sqrt(samples), floor), 0)
     found = _decaying(steps, plain, distinct) or plain
     total = int(found.freedom.sum())
@@ -138,8 +137,7 @@ def common_rounding(steps: tuple[MeasuredStep, ...], std: Array) -> Array:
     std : (n,) N
         Of one sample, its rounding included.
     """
-    samples = [np.array([step.force]) if step.hold_forces is None else step.hold_forces for step in steps]
-    digit = resolution(samples)
+    digit = resolution([step.samples for step in steps])
     if not digit > 0.0:
         return np.zeros(len(steps))
     scatter = np.maximum((std / digit) ** 2 - 1.0 / 12.0, 0.0)

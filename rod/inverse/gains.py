@@ -8,8 +8,8 @@ those of the balance equations, so that a comparison of both ways knows what the
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.base import AXES
 from rod.inverse.fit import Fit
 from rod.inverse.mean_law import force_rows, linearised, rows_posterior, weights
@@ -17,8 +17,6 @@ from rod.inverse.noise import by_axes
 from rod.inverse.observation import DISPLACEMENT_STD, Observation, PhotoData, observe
 from rod.measured_law import Source
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 
 def gains(test: MeasuredTest, observation: Observation, fitted: Fit, response: Array) -> dict[Source, Array]:
@@ -83,7 +81,7 @@ def loaded_pre_curvature(
 ) -> tuple[float, float]:
     """K0 and its standard deviation, 1/m, without the photos of the steps ``rest``: a witness of its own."""
     at = fitted.extension.base.pre_curvature_index
-    value, J = linearised(observation, fitted, np.zeros((len(fitted.residual), 0)))
+    value, J = linearised(observation, fitted)
     count, kept = observation.rows.count, ~np.isin(observation.rows.step, list(rest))
     if kept.all():
         return float(fitted.vector[at]), float(np.sqrt(rows_posterior(fitted, value, J).covariance[at, at]))

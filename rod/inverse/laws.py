@@ -10,18 +10,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
-from rod.characteristic import Characteristic, ParametricCurve
+from rod.array import Array
+from rod.characteristic import Characteristic
 from rod.compliance_law import ComplianceLaw, LawBasis, moment_basis, refreshed
-from rod.law_prior import TAUS, Family, priors
+from rod.law_prior import Family, priors
 from rod.stiffness_law import StiffnessLaw
-
-Array = NDArray[np.float64]
 
 COEFFICIENTS = 16
 """Of log f_EI: enough for a law of any form about which causes are weighed."""
@@ -42,33 +40,6 @@ of the other sign, takes a zero of the displacement for its own."""
 
 FreeLaw = StiffnessLaw | ComplianceLaw
 Abscissa = Literal["bend", "moment"]
-
-
-class Law(Protocol):
-    """What a base model asks of the unknowns of its law."""
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-
-    def curve(self, unknowns: Array) -> ParametricCurve:
-        """The law at unknowns (size,)."""
-
-    def by(self, unknowns: Array) -> Array:
-        """Change (k, size) of the curve's own k parameters with the unknowns."""
-
-    def stiffer(self, factor: float) -> Array:
-        """Change (size,) of the unknowns that makes the law so much stiffer."""
-
-    def prior(self) -> Array:
-        """Rows (m, size) of unit variance about zero: what a fit holds the unknowns by."""
-
-    @property
-    def families(self) -> tuple[Family, ...]:
-        """All that is known of the form: what fits are weighed by."""
-
-    def softening(self, unknowns: Array) -> tuple[float, Array]:
-        """Of unit variance about zero: how far the law falls from rest, and its derivative (size,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,19 +65,16 @@ class AnyLaw:
         return StiffnessLaw(law) if self.over == "bend" else law
 
     def by(self, unknowns: Array) -> Array:
-        """The coefficients are the law's own parameters."""
+        """Change (size, size) of the curve's own parameters with the unknowns: the coefficients are its parameters."""
         return np.eye(self.size)
 
     def stiffer(self, factor: float) -> Array:
-        """All coefficients alike: B-splines of equal coefficients are a constant."""
+        """Change (size,) that makes the law so much stiffer: B-splines of equal coefficients are a constant."""
         return np.full(self.size, np.log(factor) if self.over == "bend" else -np.log(factor))
 
-    def prior(self) -> Array:
-        """A rough law that is flat at rest, as far as `ROUGHNESS` and `REST_SLOPE` let it."""
-        return self._prior
-
     @cached_property
-    def _prior(self) -> Array:
+    def prior(self) -> Array:
+        """Rows (m, size) a fit holds it by: rough, and flat at rest, as far as `ROUGHNESS` and `REST_SLOPE` let it."""
         rough = priors(self.basis, "rough")[0]
         slope = self.basis.spline(self.basis.xi[2 * self.basis.rest], 1) / REST_SLOPE
         weight, mode = np.linalg.eigh(rough.form / ROUGHNESS**2 + np.outer(slope, slope))
@@ -115,7 +83,10 @@ class AnyLaw:
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """Laws that change alike everywhere: quick ones would triple the work, and are the same for all causes."""
+        """What fits are weighed by: laws that change alike everywhere.
+
+        Quick ones would triple the work, and are the same for all causes.
+        """
         return priors(self.basis, "even")
 
     def softening(self, unknowns: Array) -> tuple[float, Array]:
@@ -154,20 +125,13 @@ class FewPoints:
         """All ordinates alike."""
         return np.full(self.size, np.log(factor))
 
+    @property
     def prior(self) -> Array:
         """No rows: few points need no prior."""
         return np.zeros((0, self.size))
 
-    @property
-    def families(self) -> tuple[Family, ...]:
-        """One family that knows nothing."""
-        none = np.zeros((self.size, self.size))
-        return (Family(none, none, np.zeros(len(TAUS))),)
 
-    def softening(self, unknowns: Array) -> tuple[float, Array]:
-        """Nothing is known of it."""
-        return 0.0, np.zeros(self.size)
-
+Law = AnyLaw | FewPoints
 
 BINS = 40
 """Of the moments that photos show: each holds the curvatures of some dozens of sections."""
@@ -213,8 +177,7 @@ def as_photographed(
     plain = AnyLaw(moment_basis(0.0, float(bend[-1]), unit=unit, size=COEFFICIENTS))
     rows = plain.basis.at(0.5 * (bend[1:] + bend[:-1])) / SURE
     log_f = np.log(np.diff(m) / np.diff(bend) / unit) / SURE
-    prior = plain.prior()
-    found = np.linalg.lstsq(np.vstack([rows, prior]), np.r_[log_f, np.zeros(len(prior))])[0]
+    found = np.linalg.lstsq(np.vstack([rows, plain.prior]), np.r_[log_f, np.zeros(len(plain.prior))])[0]
     rise = plain.basis.law(found)
     law = AnyLaw(refreshed(rise, 0.0, float(bend[-1])))
     return law, law.basis.projected(rise), rest

@@ -15,10 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.observation import Observation, foot_points, of_hold
 from rod.inverse.prediction import Prediction
-
-Array = NDArray[np.float64]
 
 
 class _Nodes(NamedTuple):
@@ -63,8 +62,8 @@ def columns_of(observation: Observation, at: Prediction, moved: Prediction, step
 
 def _forces(observation: Observation, at: Prediction, moved: Prediction) -> list[Array]:
     """Changes (h, k) of the holds."""
-    common = observation.force_common or (0.0,) * len(observation.forces)
-    holds = zip(observation.forces, at.samples, moved.samples, observation.force_std, common, strict=True)
+    noise = observation.force_std, observation.force_common
+    holds = zip(observation.forces, at.samples, moved.samples, *noise, strict=True)
     return [of_hold((new - old).T[: len(data)] / std, alike / std) for data, old, new, std, alike in holds]
 
 

@@ -16,13 +16,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.base_fit import laid_along
-from rod.inverse.fit import Fit, evaluated
+from rod.inverse.fit import Fit, evaluated, shown
 from rod.inverse.laws import Abscissa, AnyLaw
 from rod.inverse.observation import Observation, of_hold
 from rod.law_prior import Posterior, averaged, priors
-
-Array = NDArray[np.float64]
 
 LAYINGS, MOVES, SETTLED = 3, 6, 0.05
 """Times that the abscissa is laid along the law found, steps to the mean on each, and the standard deviations by which
@@ -102,7 +101,7 @@ def _at(observation: Observation, fitted: Fit, vector: Array) -> Fit | None:
     """The model at another vector, not fitted; None where that is impossible."""
     if not fitted.extension.admissible(vector):
         return None
-    there = evaluated(observation, fitted.extension, vector, fitted.run)
+    there = evaluated(observation, fitted.extension, shown(observation, fitted.extension, vector, fitted.run))
     return None if there.run.prediction is None else replace(there, converged=fitted.converged)
 
 
@@ -114,8 +113,7 @@ def mean_posterior(
     ``beside`` (N, j) are traces of further unknowns, each of standard deviation one and mean zero; ``held`` (p,) says
     which numbers of causes stay where they are.
     """
-    rows = linearised(observation, fitted, np.zeros((len(fitted.residual), 0)) if beside is None else beside)
-    return rows_posterior(fitted, *rows, held=held)
+    return rows_posterior(fitted, *linearised(observation, fitted, beside), held=held)
 
 
 def rows_posterior(fitted: Fit, value: Array, J: Array, *, held: NDArray[np.bool_] | None = None) -> Posterior:
@@ -128,8 +126,12 @@ def rows_posterior(fitted: Fit, value: Array, J: Array, *, held: NDArray[np.bool
     return averaged(value, J, np.r_[fitted.vector, np.zeros(J.shape[1] - len(fitted.vector))], priors(law.basis))
 
 
-def linearised(observation: Observation, fitted: Fit, beside: Array) -> tuple[Array, Array]:
-    """Residual (n,) and its derivative: data by their `weights`, and all prior knowledge but that of the law."""
+def linearised(observation: Observation, fitted: Fit, beside: Array | None = None) -> tuple[Array, Array]:
+    """Residual (n,) and its derivative: data by their `weights`, and all prior knowledge but that of the law.
+
+    For ``beside`` see `mean_posterior`.
+    """
+    beside = np.zeros((len(fitted.residual), 0)) if beside is None else beside
     base, facts = fitted.extension.base, fitted.extension.facts
     count, weight = observation.rows.count, weights(observation, fitted)
     known = count + base.known
@@ -173,8 +175,5 @@ def moved_by_forces(observation: Observation, fitted: Fit, response: Array, erro
 
 def force_rows(observation: Observation, newtons: Array) -> list[Array]:
     """Whitened change (h,) of every hold where its force changes by ``newtons`` (n,) N."""
-    common = observation.force_common or (0.0,) * len(observation.forces)
-    return [
-        of_hold(np.full(len(data), off / std), alike / std)
-        for data, off, std, alike in zip(observation.forces, newtons, observation.force_std, common, strict=True)
-    ]
+    holds = zip(observation.forces, newtons, observation.force_std, observation.force_common, strict=True)
+    return [of_hold(np.full(len(data), off / std), alike / std) for data, off, std, alike in holds]

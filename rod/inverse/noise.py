@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from rod.array import Array
 from rod.measurement import MeasuredShape, slow_covariance
 from rod.midline import Midline
-
-Array = NDArray[np.float64]
 
 STRETCHES = (0.35, 0.5, 0.64, 0.8, 1.0, 1.25, 1.6, 2.1, 2.8, 3.6, 4.5)
 """Trial factors of the stated correlation length; a grid of ratio 1.7 chose 0.6 where 0.8 was likeliest and put the
@@ -70,15 +68,10 @@ def smooth_basis(s: Array, length: float, *, functions: int) -> Array:
 
 @dataclass(frozen=True)
 class PhotoNoise:
-    """Correction of the stated noise of sections: std times ``factor``, correlation length times ``stretch``.
-
-    ``doubt`` is the standard deviation of the logarithm of its slow part's variance, which is what a misfit has to
-    exceed: nothing but its extrapolation from the fast part is known.
-    """
+    """Correction of the stated noise of sections: std times ``factor``, correlation length times ``stretch``."""
 
     factor: float = 1.0
     stretch: float = 1.0
-    doubt: float = 0.0
 
 
 def calibrate_photo_noise(residuals: list[Array], sections: list[Midline], bases: list[Array]) -> PhotoNoise:
@@ -95,33 +88,24 @@ def calibrate_photo_noise(residuals: list[Array], sections: list[Midline], bases
         Normal distance of the block means from any smooth reference (the fitted cable).
     sections, bases : lists
         Per photo; bases (k, q) as of `smooth_basis`.
-
-    Returns
-    -------
-    PhotoNoise
     """
-    turned = [linalg.qr(basis)[0] for basis in bases]
-    split = [(q[:, : basis.shape[1]], q[:, basis.shape[1] :]) for q, basis in zip(turned, bases, strict=True)]
-    fast = [contrast.T @ residual for (_, contrast), residual in zip(split, residuals, strict=True)]
+    contrasts = [linalg.qr(basis)[0][:, basis.shape[1] :] for basis in bases]
+    fast = [contrast.T @ residual for contrast, residual in zip(contrasts, residuals, strict=True)]
 
-    def level(stretch: float) -> tuple[float, float, float]:
-        """Factor, log-likelihood and log of the slow variance at a stretch."""
-        square, freedom, determinant, slow = PRIOR_WEIGHT, PRIOR_WEIGHT, 0.0, 0.0
-        for part, block, (smooth, contrast) in zip(fast, sections, split, strict=True):
-            covariance = section_covariance(block, stretch=stretch)
-            root = linalg.cholesky(contrast.T @ covariance @ contrast, lower=True)
+    def level(stretch: float) -> tuple[float, float]:
+        """Factor and log-likelihood at a stretch."""
+        square, freedom, determinant = PRIOR_WEIGHT, PRIOR_WEIGHT, 0.0
+        for part, block, contrast in zip(fast, sections, contrasts, strict=True):
+            root = linalg.cholesky(contrast.T @ section_covariance(block, stretch=stretch) @ contrast, lower=True)
             square += float(np.sum(linalg.solve_triangular(root, part, lower=True) ** 2))
             freedom += contrast.shape[1]
             determinant += 2.0 * float(np.sum(np.log(np.diag(root))))
-            slow += float(np.sum(smooth * (covariance @ smooth)))
         off = np.log(stretch) / STRETCH_SPREAD
         value = -0.5 * (determinant + freedom * np.log(square / freedom) + off**2)
-        return float(np.sqrt(square / freedom)), value, float(np.log(slow * square / freedom))
+        return float(np.sqrt(square / freedom)), value
 
     trials = np.array([level(stretch) for stretch in STRETCHES])
     weight = np.exp(trials[:, 1] - trials[:, 1].max())
     weight /= weight.sum()
     stretch = float(np.exp(weight @ np.log(STRETCHES)))
-    freedom = PRIOR_WEIGHT + sum(part.size for part in fast)
-    scatter = float(weight @ (trials[:, 2] - weight @ trials[:, 2]) ** 2)
-    return PhotoNoise(level(stretch)[0], stretch, float(np.sqrt(scatter + 2.0 / freedom)))
+    return PhotoNoise(level(stretch)[0], stretch)

@@ -15,7 +15,7 @@ Sign: residual = (data - model) / sigma.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import NamedTuple
@@ -24,19 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from rod.array import Array
 from rod.inverse.common_errors import CommonErrors, common_errors
 from rod.inverse.force_noise import common_rounding, force_noise
-from rod.inverse.noise import (
-    PhotoNoise,
-    by_axes,
-    section_covariance,
-    smooth_basis,
-)
+from rod.inverse.noise import PhotoNoise, by_axes, section_covariance, smooth_basis
 from rod.inverse.prediction import Prediction
 from rod.measurement import MeasuredTest
 from rod.midline import BLOCKS, LEAST_SECTIONS, NOWHERE, Midline, midline
-
-Array = NDArray[np.float64]
 
 HOLD_NOISE_LEVEL = 1e-3
 """Probability; holds have noise levels of their own only if equality is refuted at this level."""
@@ -131,7 +125,7 @@ class Observation:
     force_own : tuple of float
         Freedom of each step's ``force_std``, where each has a level of its own; else empty.
     force_common : tuple of float
-        Error (N) of each step that all its samples have alike (rounding, see `force_noise`); empty where there is none.
+        Error (N) of each step that all its samples have alike (rounding, see `force_noise`).
     common : CommonErrors or None
         What all photos err alike.
     photos : tuple of PhotoData
@@ -145,13 +139,13 @@ class Observation:
     forces: tuple[Array, ...]
     force_std: Array
     force_freedom: int
+    force_own: tuple[float, ...]
+    force_common: tuple[float, ...]
+    common: CommonErrors | None
     photos: tuple[PhotoData, ...]
     photo_noise: PhotoNoise
     rows: Row
     added: Array | float = 0.0
-    force_own: tuple[float, ...] = ()
-    force_common: tuple[float, ...] = ()
-    common: CommonErrors | None = None
 
     def joined(self, values: Array) -> Array:
         """Rows (N, ...) whitened photo by photo -> whitened with the errors that photos share."""
@@ -208,8 +202,7 @@ def observe(
     kind: list[Array] = []
     where: list[Array] = []
     for i, step in enumerate(test.steps):
-        samples = np.array([step.force]) if step.hold_forces is None else step.hold_forces
-        forces.append(samples[:0] if i in without_forces else samples)
+        forces.append(step.samples[:0] if i in without_forces else step.samples)
         kind.append(np.zeros(len(forces[-1]), dtype=int))
         where.append(np.full(len(forces[-1]), i))
     for i, step in enumerate(test.steps):
@@ -222,8 +215,8 @@ def observe(
     rows = Row(np.concatenate(kind).astype(int), np.concatenate(where).astype(int))
     alike = common_errors([photo.sections for photo in photos], [photo.whiten for photo in photos])
     rounding = tuple(common_rounding(test.steps, level.std).tolist())
-    observed = Observation(tuple(forces), level.std, level.freedom, tuple(photos), noise, rows, common=alike)
-    return replace(observed, force_own=level.own, force_common=rounding)
+    of_forces = level.std, level.freedom, level.own, rounding
+    return Observation(tuple(forces), *of_forces, alike, tuple(photos), noise, rows)
 
 
 def _photo_data(index: int, test: MeasuredTest, noise: PhotoNoise, functions: int) -> PhotoData:
@@ -268,13 +261,8 @@ def _whitening(
 
 def residual(observation: Observation, prediction: Prediction) -> Array:
     """Whitened residual (N,) without priors, rows as in ``observation.rows``."""
-    common = observation.force_common or (0.0,) * len(observation.forces)
-    parts = [
-        of_hold((data - model[: len(data)]) / std, alike / std)
-        for data, model, std, alike in zip(
-            observation.forces, prediction.samples, observation.force_std, common, strict=True
-        )
-    ]
+    holds = zip(observation.forces, prediction.samples, observation.force_std, observation.force_common, strict=True)
+    parts = [of_hold((data - model[: len(data)]) / std, alike / std) for data, model, std, alike in holds]
     sections = observation.all_sections
     across = _distance(sections, prediction)
     for photo, own in zip(observation.photos, sections.of_photo, strict=True):

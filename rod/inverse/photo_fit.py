@@ -9,15 +9,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.fit import Fit
 from rod.inverse.noise import by_axes
 from rod.inverse.observation import Observation, PhotoData, Places, foot_points
 from rod.measurement import MeasuredShape
 from rod.midline import Midline
-
-Array = NDArray[np.float64]
 
 
 class PhotoFit(NamedTuple):

@@ -13,13 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.bending_test import BendingTest
 from rod.equilibrium import Branch
 from rod.measurement import MeasuredStep, MeasuredTest
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +107,7 @@ def facts_of(test: MeasuredTest) -> Facts:
     timed = all(step.hold_times is not None and step.time is not None for step in steps)
     begin, holds, photo, number = [], [], [], 0.0
     for step in steps:
-        samples = number + np.arange(_samples(step), dtype=float)
+        samples = number + np.arange(len(step.samples), dtype=float)
         number += samples.size
         times = step.hold_times if timed and step.hold_times is not None else samples
         begin.append(float(times[0]))
@@ -147,10 +145,6 @@ def _range(kappa: Array) -> float:
     """Range of curvatures of a photo, 1/m, without the outermost 2 %: at the rim of what is seen they are uncertain."""
     low, high = np.quantile(kappa, [0.02, 0.98])
     return float(high - low)
-
-
-def _samples(step: MeasuredStep) -> int:
-    return 1 if step.hold_forces is None else len(step.hold_forces)
 
 
 UNLOGGED = 0.05

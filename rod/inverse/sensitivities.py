@@ -13,16 +13,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.inverse.bending import bending_numbers, combined, plainly
 from rod.inverse.extension import Extension
 from rod.inverse.linearised import columns_of
 from rod.inverse.observation import Observation, residual
 from rod.inverse.prediction import Model, Prediction
 from rod.inverse.simulation import Run, moved, observed, run
-
-Array = NDArray[np.float64]
 
 SHORT = 1e-2
 """Of the step of a difference quotient, for what is not simulated: at a thousandth of its range the trace of a

@@ -12,15 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rod.array import Array
 from rod.equilibrium import Branch, Equilibrium, solve
 from rod.inverse.prediction import Facts, Model, Prediction
 from rod.newton import Outcome
 from rod.parameters import Parameter
 from rod.sensitivity import Derivatives, derivatives
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

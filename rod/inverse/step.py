@@ -13,18 +13,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from rod.array import Array
 from rod.inverse.extension import Extension
-
-Array = NDArray[np.float64]
-
-LAW_REACH = 0.7
-"""Logarithm by which one step may move an unknown of the law at most: a factor two."""
-
-BEND_REACH = 0.2
-"""Of the curvature scale: how far one step may move K0 at most."""
 
 INSIDE = 1e-9
 """Of a bound's own scale; what exceeds it by less is rounding."""
@@ -51,18 +43,17 @@ def lasting(extension: Extension, vector: Array) -> Bounds:
             least.append(-vector[at] / size)
         for j, name in enumerate(term.variant.tuned, start=at + 1):
             low, high = term.variant.range(name)
-            rows.extend(
-                [np.eye(1, extension.size, j)[0] / (high - low), -np.eye(1, extension.size, j)[0] / (high - low)]
-            )
+            unit = np.eye(1, extension.size, j)[0] / (high - low)
+            rows.extend([unit, -unit])
             least.extend([(low - vector[j]) / (high - low), (vector[j] - high) / (high - low)])
     return Bounds(np.array(rows).reshape(-1, extension.size), np.minimum(least, 0.0))
 
 
 def reach(extension: Extension) -> Bounds:
-    """How far one step may go (m, p)."""
-    far = dict.fromkeys(range(extension.base.law.size), LAW_REACH)
+    """How far one step may go (m, p): by a factor two in the law, and by a fifth of the curvature scale in K0."""
+    far = dict.fromkeys(range(extension.base.law.size), 0.7)  # of logarithms
     if (bend := extension.base.pre_curvature_index) is not None:
-        far[bend] = BEND_REACH * extension.facts.curvature_scale
+        far[bend] = 0.2 * extension.facts.curvature_scale
     unit = np.eye(extension.size)[list(far)] / np.array(list(far.values()))[:, None]
     return Bounds(np.vstack([unit, -unit]), np.full(2 * len(far), -1.0))
 

@@ -13,7 +13,7 @@ import pytest
 from rod.balance import balance
 from rod.bending_test import TABLE_1_KNOTS, simulate, table_1
 from rod.inverse import estimate
-from rod.inverse.fit import evaluated
+from rod.inverse.fit import evaluated, shown
 from rod.inverse.simulation import run
 from rod.paper_fit import Virtual, paper_fit
 from tests.rod.virtual_cable import StickSlip, force_free
@@ -42,7 +42,7 @@ def evaluation(truth):
     observation, fitted = truth
     beside = fitted.vector.copy()
     beside[0] += 1e-3
-    return evaluated(observation, fitted.extension, beside, fitted.run)
+    return evaluated(observation, fitted.extension, shown(observation, fitted.extension, beside, fitted.run))
 
 
 def seconds(function, repeats=5):

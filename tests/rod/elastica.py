@@ -31,7 +31,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq, root
 
-from rod.characteristic import Array, MomentCurve
+from rod.array import Array
+from rod.characteristic import MomentCurve
 
 
 class _Rule(NamedTuple):

@@ -25,7 +25,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rod.characteristic import Array
+from rod.array import Array
 from rod.discretisation import Rod
 from rod.section import Memory
 from rod.support import Support

@@ -271,7 +271,7 @@ def test_all_parameters_in_one_call_are_the_single_ones() -> None:
     steps = displaced(EVERYTHING, None)
     every = ["ordinates", *(parameter(name) for name in VARIATIONS if not name.startswith("ordinates"))]
     together = derivatives(EVERYTHING, steps, every)[-1]
-    assert len(together.names) == len(VARIATIONS)
+    assert together.force.size == len(VARIATIONS)
     for name in ("pre_curvature", "hysteresis", "load_x"):
         alone = derivatives(EVERYTHING, steps, [parameter(name)])[-1]
         column = list(VARIATIONS).index(name)

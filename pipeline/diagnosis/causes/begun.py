@@ -13,16 +13,14 @@ begins.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.law import multiplied
+from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model
-
-Array = NDArray[np.float64]
 
 SHARE = 0.25
 """Of the probability of something else beforehand: of what begins between two holds, and of unknown forces."""
@@ -70,7 +68,8 @@ class OtherRest(Begun):
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Add ``amount`` to K0 from the step ``at`` on."""
-        return with_rest(model, np.outer(amount * self.course(variant, facts), np.ones_like(joints(model))))
+        moved = np.outer(amount * self.course(variant, facts), np.ones_like(joints(model)))
+        return with_more(model, "grown", moved)
 
 
 class OtherStiffness(Begun):
@@ -111,10 +110,11 @@ def joints(model: Model) -> Array:
     return np.linspace(0.0, 1.0, int(model.bending.elements) + 1)
 
 
-def with_rest(model: Model, more: Array) -> Model:
-    """The model whose rest is moved at each step and joint by (steps, n) 1/m."""
-    given = model.bending.grown
-    return replace(model, bending=replace(model.bending, grown=more if given is None else given + more))
+def with_more(model: Model, name: str, more: Array) -> Model:
+    """The model with ``more`` of what its `BendingTest` is given step by step under a name, (steps, ...)."""
+    given = getattr(model.bending, name)
+    changes: dict[str, Any] = {name: more if given is None else given + more}
+    return replace(model, bending=replace(model.bending, **changes))
 
 
 OTHER_STIFFNESS = OtherStiffness()

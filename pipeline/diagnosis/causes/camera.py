@@ -20,13 +20,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from rod.inverse.camera import DISTORTED, scaled, seen_through, tilt_of
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model
 
-Array = NDArray[np.float64]
 USUAL, FAR = 3.0, 12.0
 """Camera to cable in lengths: usual, and farthest: a long lens, before which a tilt is hardly seen otherwise."""
 

@@ -16,14 +16,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.load_cell import SETTLING, passed
+from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model, Observer, Prediction
 from rod.section import InternalFriction, growth
-
-Array = NDArray[np.float64]
 
 LAW = "nonlinear_stiffness"
 """Name of the cause that is no second one beside another: a further control point of the law is a finer base."""

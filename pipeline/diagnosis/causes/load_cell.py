@@ -18,12 +18,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.prediction import Facts, Model, Observer, Prediction
-
-Array = NDArray[np.float64]
 
 
 def shown(reading: Callable[[Array, Array, float], Array]) -> Observer:

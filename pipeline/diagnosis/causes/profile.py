@@ -17,16 +17,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from rod.inverse.cause import Cause, Profile, Variant
 from rod.inverse.prediction import Facts, Model
 
-Array = NDArray[np.float64]
-
 PLACES = (0.15, 0.325, 0.5, 0.675, 0.85)
-SPOT_WIDTH = 0.07
-"""Standard deviation of a spot in shares of the length: a splice or kink of some diameters; tuned in a refit."""
+"""Of spots, shares of the length."""
 
 STEEPEST = 10.0
 """Usual amounts: standard deviation of the longest wave; that of the k-th is a k-th of it, as of a sharp step. Without
@@ -44,7 +41,7 @@ def forms() -> tuple[Variant, ...]:
         Variant(
             "in a spot",
             at=place,
-            width=SPOT_WIDTH,
+            width=0.07,  # a splice or kink of some diameters
             tuned=("at", "width"),
             at_range=(0.03, 0.97),
             width_range=(0.015, 0.2),

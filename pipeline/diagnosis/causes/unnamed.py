@@ -21,14 +21,12 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.diagnosis.causes.begun import BEGUN, SHARE, Begun, joints, with_rest
+from pipeline.diagnosis.causes.begun import BEGUN, SHARE, Begun, joints, with_more
+from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.extension import Term
 from rod.inverse.prediction import Facts, Model
-
-Array = NDArray[np.float64]
 
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Of the largest force, moment or bend, their standard deviation: steps of a factor 3.3, over which a normal density
@@ -109,8 +107,7 @@ class UnknownMoments(_Unknown):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Bend an end of the cable by ``amount``, as its course says."""
         more = amount * np.outer(self.course(variant, facts), np.array(["left", "right"]) == variant.label)
-        given = model.bending.moments_by_step
-        return replace(model, bending=replace(model.bending, moments_by_step=more if given is None else given + more))
+        return with_more(model, "moments_by_step", more)
 
 
 class UnknownBends(_Unknown):
@@ -127,7 +124,7 @@ class UnknownBends(_Unknown):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Move the rest by ``amount`` along a half wave, as its course says."""
         wave = np.sin(WAVES[variant.label] * np.pi * joints(model))
-        return with_rest(model, np.outer(amount * self.course(variant, facts), wave))
+        return with_more(model, "grown", np.outer(amount * self.course(variant, facts), wave))
 
 
 class UnknownForces(_Unknown):
@@ -155,7 +152,7 @@ class UnknownForces(_Unknown):
         """Push the cable by ``amount``, as its course says."""
         force = np.outer(amount * self.course(variant, facts), _at(POINTS[variant.label], joints(model)))
         way = np.array([1.0, 0.0] if variant.setting == ALONG else [0.0, 1.0])
-        return _pushed(model, force[:, :, None] * way, model.bending.forces_by_step)
+        return with_more(model, "forces_by_step", force[:, :, None] * way)
 
 
 class PlaceOfForce(Cause):
@@ -182,7 +179,8 @@ class PlaceOfForce(Cause):
         """Let the forces act at ``amount`` (of the length) beyond their place."""
         forces, places = model.bending.forces_by_step, joints(model)
         whole = np.zeros((1, 2)) if forces is None else forces.sum(axis=1)
-        return _pushed(model, whole[:, None, :] * _at(POINTS[variant.label] + amount, places)[:, None])
+        moved = whole[:, None, :] * _at(POINTS[variant.label] + amount, places)[:, None]
+        return replace(model, bending=replace(model.bending, forces_by_step=moved))
 
 
 def carried_over(terms: Sequence[Term], known: Sequence[Term], amounts: Array, facts: Facts) -> Array:
@@ -205,11 +203,6 @@ def _at(u: float, joints: Array) -> Array:
     """A force at a share of the length, divided between the two joints (n,) beside it."""
     inside = min(max(u, joints[1]), joints[-2])
     return np.asarray(np.maximum(1.0 - np.abs(joints - inside) / joints[1], 0.0))
-
-
-def _pushed(model: Model, forces: Array, beside: Array | None = None) -> Model:
-    """The model with forces (steps, n, 2) N on its joints."""
-    return replace(model, bending=replace(model.bending, forces_by_step=forces if beside is None else beside + forces))
 
 
 PLACE = PlaceOfForce()

@@ -11,7 +11,6 @@ from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Posterior
-from pipeline.diagnosis.statistics.twins import between_causes, cosines
 from rod.inverse.fit import Fit
 
 
@@ -80,8 +79,7 @@ def _classes(bench: Workbench, believed: Posterior, accepted: Explanation) -> tu
     closer one of a pair for a single cause. A set that holds the accepted causes and another one says nothing against
     them.
     """
-    suspicion = bench.suspicion
-    close = between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))
+    close = bench.suspicion.closeness()
     np.fill_diagonal(close, 2.0)
     places: list[list[int]] = [[cause] for cause in accepted.causes]
     for other in believed.credible():

@@ -17,7 +17,7 @@ from pipeline.diagnosis.causes.profile import forms_between
 from pipeline.diagnosis.explanations.refit import cost
 from rod.inverse.cause import Variant
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import Fit, fit_from
+from rod.inverse.fit import Fit, fit
 from rod.inverse.observation import Observation
 
 SHAPE_GAIN = 16.0
@@ -40,7 +40,7 @@ def with_all_components(observation: Observation, fitted: Fit, term: Term, *, ho
         return fitted
     begin = fitted.amount(known.terms_of(cause)[0])[0] if cause.sign else 0.0
     start = np.r_[fitted.vector, np.full(len(added), begin)]
-    found = fit_from(observation, replace(known, terms=(*known.terms, *added)), start, fitted, hopeless=hopeless)
+    found = fit(observation, replace(known, terms=(*known.terms, *added)), start, near=fitted.run, hopeless=hopeless)
     return fitted if found.run.prediction is None else found
 
 
@@ -62,7 +62,7 @@ def _spread(observation: Observation, fitted: Fit, cause: Cause, forms: Sequence
     rest, vector = fitted.extension.without(fitted.vector, own)
     every = tuple(Term(cause, replace(form, tuned=())) for form in forms)
     start = np.r_[vector, np.full(len(every), total / len(every))]
-    spread = fit_from(observation, replace(rest, terms=(*rest.terms, *every)), start, fitted)
+    spread = fit(observation, replace(rest, terms=(*rest.terms, *every)), start, near=fitted.run)
     if spread.run.prediction is None:
         return fitted
     amounts = zip(forms, spread.vector[len(vector) :], strict=True)
@@ -70,7 +70,7 @@ def _spread(observation: Observation, fitted: Fit, cause: Cause, forms: Sequence
     if not needed:
         return fitted
     start = np.concatenate([spread.vector[: len(vector)], *(term.numbers(amount) for term, amount in needed)])
-    found = fit_from(observation, replace(rest, terms=(*rest.terms, *(term for term, _ in needed))), start, spread)
+    found = fit(observation, replace(rest, terms=(*rest.terms, *(term for term, _ in needed))), start, near=spread.run)
     return fitted if found.run.prediction is None else without_needless_forms(observation, found, cause)
 
 
@@ -79,7 +79,7 @@ def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) 
     while len(own := fitted.extension.terms_of(cause)) > 1:
         enough = fitted.chi2 + SHAPE_GAIN
         shorter = [
-            fit_from(observation, *fitted.extension.without(fitted.vector, {form}), fitted, hopeless=enough)
+            fit(observation, *fitted.extension.without(fitted.vector, {form}), near=fitted.run, hopeless=enough)
             for form in own
         ]
         simplest = min(shorter, key=lambda one: one.chi2 if one.run.prediction is not None else np.inf)
@@ -102,5 +102,5 @@ def as_one_form(observation: Observation, fitted: Fit) -> list[Fit]:
     for variant, amount, stiffer in forms_between(extension.base_model(fitted.vector), extension.model(fitted.vector)):
         alone = Extension(extension.base, extension.facts, (Term(cause, variant),))
         start = alone.base.stiffer(alone.start(fitted.vector, (amount,)), 1.0 + stiffer)
-        found.append(fit_from(observation, alone, start, fitted))
+        found.append(fit(observation, alone, start, near=fitted.run))
     return sorted((one for one in found if one.run.prediction is not None), key=lambda one: one.chi2)[:1]

@@ -10,15 +10,13 @@ that nothing asks for stay at zero, and whether waves are likelier than a few fo
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import deviation, position_of, profile, wave
+from pipeline.records import Array
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import Fit, fit_from
+from rod.inverse.fit import Fit, fit
 from rod.inverse.observation import Observation
-
-Array = NDArray[np.float64]
 
 WAVES = 24
 """Of a sharp step of K0 by 3 1/m, 24 leave waves of 0.5 um across the cable: a twentieth of a pixel's tenth, below what
@@ -42,7 +40,7 @@ def free_profile(observation: Observation, fitted: Fit, cause: Cause) -> list[Fi
         # nothing shows the cable at rest, and few forms that are far from the data leave the side of K0 to chance
         starts.append(np.r_[base.neutral(), vector[len(base.names) :]])
         starts[1][at] = -vector[at]
-    found = [fit_from(observation, extension, start, fitted) for start in starts]
+    found = [fit(observation, extension, start, near=fitted.run) for start in starts]
     return sorted((one for one in found if one.run.prediction is not None), key=lambda one: one.chi2)[:1]
 
 

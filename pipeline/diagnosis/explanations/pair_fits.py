@@ -21,7 +21,7 @@ from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from rod.inverse.cause import Profile
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import FITS, fit_from
+from rod.inverse.fit import FITS, fit
 
 
 def pairs_beside(
@@ -55,7 +55,7 @@ def together(bench: Workbench, directions: Sequence[int]) -> list[Explanation]:
     move = move / np.where(size > 0.0, size, 1.0)
     extension = Extension(base.extension.base, bench.facts, terms)
     start = extension.start(base.vector + move[: len(base.vector)], tuple(move[len(base.vector) :]))
-    fitted = fit_from(bench.observation, extension, extension.brought_inside(start), base)
+    fitted = fit(bench.observation, extension, extension.brought_inside(start), near=base.run)
     causes = tuple(int(suspicion.owner[k]) for k in directions)
     return [explanation_of(causes, base, fitted)] if fitted.converged else []
 
@@ -79,9 +79,9 @@ def with_components(bench: Workbench, pair: Explanation) -> Explanation:
 
 
 def in_any_form(bench: Workbench, found: Sequence[Explanation]) -> list[Explanation]:
-    """The best pairs with sums of forms, and with profiles of any form."""
+    """The best two pairs, for the time that takes, with sums of forms, and with profiles of any form."""
     new: list[Explanation] = []
-    for pair in sorted(found, key=lambda e: -e.worth)[:IN_ANY_FORM]:
+    for pair in sorted(found, key=lambda e: -e.worth)[:2]:
         fitted = [pair.fitted]
         for kind in (bench.suspicion.causes[cause] for cause in pair.causes):
             if isinstance(kind, Profile):
@@ -105,11 +105,7 @@ def by_step(bench: Workbench, one: Explanation, *, hopeless: float = np.inf) -> 
         for forms in kind.by_step(one.fitted.amount(own[0])[0], bench.facts) if len(own) == 1 else ():
             extension = replace(known, terms=(*known.terms, *(Term(kind, form) for form in forms)))
             start = np.r_[one.fitted.vector, np.zeros(len(forms))]
-            fitted = fit_from(bench.observation, extension, start, one.fitted, hopeless=hopeless)
+            fitted = fit(bench.observation, extension, start, near=one.fitted.run, hopeless=hopeless)
             if fitted.run.prediction is not None:
                 found.append(explanation_of(one.causes, bench.base, fitted))
     return found
-
-
-IN_ANY_FORM = 2
-"""Pairs, the best first, that get forms with a place of their own; time."""

@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.search import TRACE, Suspicion
 from pipeline.diagnosis.posterior.products import WORSE
+from pipeline.records import Array
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import FAR, Fit, State, fit_from, shown
+from rod.inverse.fit import FAR, Fit, State, fit, shown
 from rod.inverse.observation import Observation
-
-Array = NDArray[np.float64]
 
 SHARES = (1.0, 0.3, 0.1)
 """Of a linear estimate, tried before a refit."""
@@ -111,15 +109,15 @@ def fit_term(
     for start, spare in ((linear_start(observation, added), False), *_elsewhere(added)):
         if spare and hopeless < far:
             continue
-        found = fit_from(observation, added.extension, start, base, hopeless=hopeless)
+        found = fit(observation, added.extension, start, near=base.run, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best, hopeless = found, min(hopeless, found.chi2)  # from elsewhere only what leads lower is of use
     return best
 
 
 def cost(fitted: Fit) -> float:
-    """Chi-square plus two for every parameter."""
-    return fitted.chi2 + 2.0 * fitted.extension.size
+    """Chi-square plus two for every parameter (Akaike), infinite without equilibrium."""
+    return fitted.chi2 + 2.0 * fitted.extension.size if fitted.run.prediction is not None else np.inf
 
 
 def linear_start(observation: Observation, added: Addition) -> Array | State:

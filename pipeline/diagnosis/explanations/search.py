@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -41,7 +42,7 @@ from pipeline.diagnosis.posterior.hypotheses import ALIKE, SHARES, Hypothesis, P
 from pipeline.diagnosis.posterior.weigh import Weighed, refitted, weighed
 from rod.inverse.base_fit import settled
 from rod.inverse.extension import Term
-from rod.inverse.fit import FITS, Fit, fit_from
+from rod.inverse.fit import FITS, Fit, fit
 
 LIKELIEST = 4
 """Refits, the likeliest first, that are weighed with something else besides; single causes that pairs begin with."""
@@ -100,7 +101,7 @@ class Search:
         bench = self.bench
         rival = min((one.fitted.chi2 for _, found in self.known.values() for one in found), default=np.inf)
         for cause in (cause for cause in causes if bench.suspicion.of(cause).size):
-            for one in known_refits(bench.observation, bench.base, bench.suspicion, cause, self.known, rival=rival):
+            for one in known_refits(bench, cause, self.known, rival=rival):
                 if one.gain > 0.0:
                     rival = min(rival, one.fitted.chi2)
                     yield from (one, *by_step(bench, one, hopeless=rival + LEAST))
@@ -117,12 +118,6 @@ class Search:
         if one not in self._about:
             self._about[one] = suspect(self.bench.observation, one.fitted, self.bench.suspicion.causes)
         return self._about[one]
-
-    def weighed_beside(self, one: Explanation) -> Weighed:
-        """Evidence of a single cause and, by the linear model, of every other one beside it."""
-        if one not in self._beside:
-            self._beside[one] = weighed(self.grid.plain, one.fitted, self.beside(one))
-        return self._beside[one]
 
     def pairs(self, singles: Sequence[Explanation], found: list[Explanation]) -> None:
         """Refit pairs besides those ``found``: single causes with what scores most beside each.
@@ -166,7 +161,9 @@ class Search:
 
     def _promised(self, one: Explanation) -> dict[int, float]:
         """Log evidence that the linear model promises of a single cause with every other one beside it."""
-        beside = self.weighed_beside(one)
+        if one not in self._beside:
+            self._beside[one] = weighed(self.grid.plain, one.fitted, self.beside(one))
+        beside = self._beside[one]
         mine = next((known.plain for known in self.hypotheses if known.found is one), beside.own.plain)
         return {cause: plain + mine - beside.own.plain for cause, (plain, _) in beside.further.items()}
 
@@ -198,7 +195,7 @@ class Search:
         """A pair without one of its causes, the rest fitted again; None where that is no better than the base."""
         kind, left = self.bench.suspicion.causes[gone], tuple(cause for cause in pair.causes if cause != gone)
         extension, vector = pair.fitted.extension.without(pair.fitted.vector, pair.fitted.extension.terms_of(kind))
-        rest = fit_from(self.bench.observation, extension, vector, pair.fitted)
+        rest = fit(self.bench.observation, extension, vector, near=pair.fitted.run)
         if rest.run.prediction is None or rest.chi2 >= self.bench.base.chi2:
             return None
         return explanation_of(left, self.bench.base, rest)
@@ -243,17 +240,18 @@ class Search:
         found = tried((unknown.ways(facts, at, first) for at in everywhere), base)
         if not found:
             return
-        best, size = max(found, key=_rest), first
+        best, size = max(found, key=attrgetter("rest")), first
         place = unknown.place_of(best.terms)
         for other in larger if _beyond(best) else (smaller,):
-            there = max(tried([unknown.ways(facts, place, other)], _fit_of(best)), key=_rest, default=best)
+            others = tried([unknown.ways(facts, place, other)], _fit_of(best))
+            there = max(others, key=attrgetter("rest"), default=best)
             if there.rest <= best.rest:
                 break
             best, size = there, other
         if size != first:
             others = tried((unknown.ways(facts, at, size) for at in everywhere if at != place), base)
-            best = max([best, *others], key=_rest)
-        best = max([best, *tried(unknown.freer(best.terms), _fit_of(best))], key=_rest)
+            best = max([best, *others], key=attrgetter("rest"))
+        best = max([best, *tried(unknown.freer(best.terms), _fit_of(best))], key=attrgetter("rest"))
         if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
             tried(unknown.since(best.terms, facts), _fit_of(best))
 
@@ -263,7 +261,7 @@ class Search:
         for terms in every:
             start = carried_over(terms, known.terms, near.vector[[*known.amounts_at]], base.facts)
             start = np.r_[near.vector[: len(base.base.names)], start]
-            yield fit_from(self.bench.observation, replace(base, terms=terms), start, near, hopeless=hopeless)
+            yield fit(self.bench.observation, replace(base, terms=terms), start, near=near.run, hopeless=hopeless)
 
     def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> list[Hypothesis]:
         seen = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)
@@ -281,10 +279,6 @@ class Search:
         believed = self.posterior
         beforehand = sum(SHARES[2]) + sum(something_else for _, something_else in SHARES.values())
         return believed.total(count=2) + believed.total(something_else=True) > beforehand
-
-
-def _rest(one: Hypothesis) -> float:
-    return one.rest
 
 
 def _fit_of(one: Hypothesis) -> Fit:

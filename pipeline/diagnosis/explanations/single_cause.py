@@ -14,11 +14,12 @@ from pipeline.diagnosis.explanations.forms import as_one_form, in_all_forms, wit
 from pipeline.diagnosis.explanations.free_profile import free_profile
 from pipeline.diagnosis.explanations.refit import cost, fit_term
 from pipeline.diagnosis.fits.search import Suspicion
+from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
 from rod.inverse.base_fit import settled
 from rod.inverse.cause import Profile
-from rod.inverse.fit import FITS, Fit, fit_from
+from rod.inverse.fit import FITS, Fit, fit
 from rod.inverse.observation import Observation
 
 ALSO = 0.01
@@ -61,12 +62,10 @@ Refits = dict[int, tuple[float, list[Explanation]]]
 """Causes that were refitted already: the rival each had, and what was found."""
 
 
-def known_refits(
-    observation: Observation, base: Fit, suspicion: Suspicion, cause: int, known: Refits, *, rival: float
-) -> list[Explanation]:
+def known_refits(bench: Workbench, cause: int, known: Refits, *, rival: float) -> list[Explanation]:
     """`refits`, unless ``known`` has them with a rival no better; they are put there."""
     if cause not in known or known[cause][0] < rival:
-        known[cause] = rival, refits(observation, base, suspicion, cause, rival=rival)
+        known[cause] = rival, refits(bench.observation, bench.base, bench.suspicion, cause, rival=rival)
     return known[cause][1]
 
 
@@ -112,7 +111,7 @@ def _fit_form(
     if found is None or found.converged:
         return found
     if found.chi2 > hopeless:  # it goes on as far as it may still come near
-        found = fit_from(observation, found.extension, found.vector, found, hopeless=hopeless)
+        found = fit(observation, found.extension, found.vector, near=found.run, hopeless=hopeless)
     tried = [found if found.chi2 > hopeless else settled(observation, found)]
     if suspicion.terms[direction].variant.tuned:
         held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)

@@ -14,15 +14,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
 from pipeline.result import CauseForm, Curve
 from rod.inverse.base_fit import law_of
 from rod.inverse.estimate import by_parameters
 from rod.inverse.fit import Fit
 from rod.measured_law import POINTS
-
-Array = NDArray[np.float64]
 
 
 def visited(fitted: Fit) -> tuple[float, float]:
@@ -30,7 +28,7 @@ def visited(fitted: Fit) -> tuple[float, float]:
 
     Where K0 varies along the cable, it is the excess over it that f_EI is known for.
     """
-    kappa = fitted.extension.base.pre_curvature(fitted.vector) + fitted.excess
+    kappa = fitted.pre_curvature + fitted.excess
     return float(kappa.min()), float(kappa.max())
 
 
@@ -43,13 +41,12 @@ class Stated(NamedTuple):
 
 def stated(fitted: Fit, kappa: Array) -> Stated:
     """f_EI of a fitted model at curvatures (n,) 1/m."""
-    law, K0 = law_of(fitted), fitted.extension.base.pre_curvature(fitted.vector)
-    tangent = law.tangent(kappa, K0)
+    tangent = law_of(fitted).tangent(kappa, fitted.pre_curvature)
     rows = np.zeros((len(kappa) + 1, fitted.extension.size))
     rows[:-1] = by_parameters(fitted, kappa)[0]
     if (bend := fitted.extension.base.pre_curvature_index) is not None:
         rows[-1, bend] = 1.0
-    return Stated(np.append(np.log(tangent), K0), rows)
+    return Stated(np.append(np.log(tangent), fitted.pre_curvature), rows)
 
 
 def curve(fitted: Fit, *, covariance: Array | None = None, other: Fit | None = None) -> Curve:
@@ -63,21 +60,19 @@ def curve(fitted: Fit, *, covariance: Array | None = None, other: Fit | None = N
     other : Fit or None
         Another answer to the same data: how far its f_EI lies from this one is one standard deviation more.
     """
-    base = fitted.extension.base
-    law, K0 = law_of(fitted), base.pre_curvature(fitted.vector)
+    law, K0 = law_of(fitted), fitted.pre_curvature
     low, high = visited(fitted)
     K = np.linspace(max(low, K0), high, POINTS)
     by_log, by_moment = by_parameters(fitted, K)
-    bend = base.pre_curvature_index
     used, root = _root(fitted, covariance)
     tangent, moment = law.tangent(K, K0), law.moment(K, K0)
     by_rest = np.zeros(fitted.extension.size)
-    if bend is not None:
+    if (bend := fitted.extension.base.pre_curvature_index) is not None:
         by_rest[bend] = 1.0
     apart_f, apart_m = [tangent[:, None] * by_log[:, used] @ root], [by_moment[:, used] @ root]
     apart_rest = [by_rest[used] @ root]
     if other is not None:
-        there, rest = law_of(other), other.extension.base.pre_curvature(other.vector)
+        there, rest = law_of(other), other.pre_curvature
         apart_f.append((there.tangent(K, rest) - tangent)[:, None])
         apart_m.append((there.moment(K, rest) - moment)[:, None])
         apart_rest.append(np.array([rest - K0]))
@@ -149,10 +144,10 @@ def factor_of(covariance: Array) -> Array:
 
 def stiffness_change(before: Fit, after: Fit) -> float:
     """Root mean square of the relative difference of f_EI at equal curvature, where both models have been bent to."""
-    ranges = [(*visited(m), m.extension.base.pre_curvature(m.vector)) for m in (before, after)]
+    ranges = [(*visited(m), m.pre_curvature) for m in (before, after)]
     low, high = max(max(low, K0) for low, _, K0 in ranges), min(high for _, high, _ in ranges)
     K = np.linspace(min(low, high), high, 60)
-    f = [law_of(m).tangent(K, m.extension.base.pre_curvature(m.vector)) for m in (before, after)]
+    f = [law_of(m).tangent(K, m.pre_curvature) for m in (before, after)]
     return float(np.sqrt(np.mean((f[1] / f[0] - 1.0) ** 2)))
 
 
@@ -182,11 +177,7 @@ def stiffness_change_linear(fitted: Fit, columns: Array, amounts: Array) -> Arra
     moves = np.linalg.pinv(fitted.jacobian / size, rcond=1e-7) @ (columns * amounts) / size[:, None]
     low, high = visited(fitted)
     K = np.linspace(low, high, 60)
-    trial = 1e-3  # first order: a thousandth of the move, scaled up again
-    return np.array([_rms_change(fitted, fitted.vector, fitted.vector + trial * m, K) / trial for m in moves.T])
-
-
-def _rms_change(fitted: Fit, before: Array, after: Array, K: Array) -> float:
-    base = fitted.extension.base
-    f = [base.characteristic(v).tangent(K, base.pre_curvature(v)) for v in (before, after)]
-    return float(np.sqrt(np.mean((f[1] / f[0] - 1.0) ** 2)))
+    base, trial = fitted.extension.base, 1e-3  # first order: a thousandth of the move, scaled up again
+    vectors = [fitted.vector, *(fitted.vector + trial * move for move in moves.T)]
+    before, *after = (base.characteristic(v).tangent(K, base.pre_curvature(v)) for v in vectors)
+    return np.array([np.sqrt(np.mean((f / before - 1.0) ** 2)) / trial for f in after])

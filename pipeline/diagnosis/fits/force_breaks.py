@@ -22,6 +22,7 @@ Codes: ``force/factor``, ``force/zero-moved``, ``force/sign``, ``force/dead``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -30,11 +31,9 @@ from numpy.typing import NDArray
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.faults import Faults, ForceCorrection
 from pipeline.messages import Message
-from pipeline.records import Finding, Level, doubtful
+from pipeline.records import Array, Finding, Level, doubtful
 from rod.inverse.fit import fit
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 FAULT = 6.0
 """Standard deviations: what is this far from what all other data say is a fault, and no chance."""
@@ -93,9 +92,10 @@ def force_break(bench: Workbench) -> tuple[Faults, float] | None:
     told = _Told.by_photos(bench)
     if told is None:
         return None
-    whole, single = told.fitted("none"), min((told.fitted("one", k) for k in range(len(told.step))), key=_rest)
+    whole, rest = told.fitted("none"), attrgetter("rest")
+    single = min((told.fitted("one", k) for k in range(len(told.step))), key=rest)
     breaks, sign = told.breaks(), told.turned()
-    best = min(breaks, key=_rest, default=None)
+    best = min(breaks, key=rest, default=None)
     if sign is not None and (best is None or sign.rest < best.rest + FAULT**2):
         best, breaks = sign, []
     elif best is None or best.rest + 1.0 > single.rest - FAULT**2:
@@ -107,10 +107,6 @@ def force_break(bench: Workbench) -> tuple[Faults, float] | None:
     other = next((one for one in others if one.rest < best.rest + UNTOLD), None)
     dead = next((one for one in (best, other) if one is not None and one.dead), None)
     return (_as_fault(bench.test, best, other) if dead is None else _without_dead(bench.test, dead)), best.rest
-
-
-def _rest(found: Break) -> float:
-    return found.rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,12 +253,9 @@ def _errors(test: MeasuredTest, found: Break, other: Break | None) -> tuple[tupl
     rows = [_corrected(shown, found) / found.amount if found.kind == "factor" else np.ones(len(shown))]
     rows[0] *= found.std
     if other is not None:
-        rows.append(np.sqrt(EITHER) * (_corrected(shown, other) - _corrected(shown, found)))
+        # the data do not tell the two kinds apart: each is as likely
+        rows.append(np.sqrt(0.5) * (_corrected(shown, other) - _corrected(shown, found)))
     return tuple(tuple(row.tolist()) for row in rows)
-
-
-EITHER = 0.5
-"""Probability of each of two kinds of a break that the data do not tell apart."""
 
 
 def _corrected(shown: Array, found: Break) -> Array:

@@ -41,13 +41,13 @@ def measured_gain(bench: Workbench, extended: Fit, settings: DiagnosisSettings) 
         folds.append(_fold(before, after, left_out))
         errors.append([rms_errors(observation, model, group) for model in (before, after)])
     found = held_out(folds, draws=DRAWS, rng=np.random.default_rng(settings.seed))
-    if found is None or not np.isfinite(found.removed):
+    if found is None or not np.isfinite(found[0]):
         return None
     force = [_rms(np.concatenate([error[k][0] for error in errors])) for k in (0, 1)]
     shape = [_rms(np.concatenate([error[k][1] for error in errors])) for k in (0, 1)]
     return GainPart(
-        heldout_excess_removed=found.removed,
-        ci95=found.interval,
+        heldout_excess_removed=found[0],
+        ci95=found[1],
         force_rmse_N=(force[0], force[1]),
         shape_rmse_m=(shape[0], shape[1]),
     )

@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.begun import OTHER_STIFFNESS
 from pipeline.diagnosis.fits.search import suspect
+from pipeline.records import Array
 from rod.inverse.fit import Fit
 from rod.inverse.mean_law import mean_law, mean_posterior, moved_by_forces
 from rod.inverse.observation import Observation
-
-Array = NDArray[np.float64]
 
 SPREAD = 0.5
 """Of the size of a cause: standard deviation of each further form that it may have. Two elements that stood for three

@@ -7,21 +7,18 @@ average, correlation along s included; so an honest model shows values within ab
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from pipeline.records import Array
 from rod.inverse.fit import Fit
 from rod.inverse.noise import section_covariance
 from rod.inverse.observation import KINDS, Observation, normal_distance
 from rod.inverse.photo_fit import photo_fit
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 COLUMNS = 24
 """Cells of the map along the cable: each averages four section blocks."""
@@ -116,40 +113,10 @@ def rms_errors(observation: Observation, fitted: Fit, steps: list[int]) -> tuple
     return np.array(force), np.concatenate(shape) if shape else np.zeros(0)
 
 
-@dataclass(frozen=True)
-class Whereabouts:
-    """At which step and place, and in which kind of data, a residual is largest.
-
-    Attributes
-    ----------
-    share : dict of kind -> share
-        Of its square.
-    step : int
-        Index of the step where it is strongest.
-    place : m or None
-        Where along the cable it is largest there; None without a photo, and so the next two.
-    across, s : list of float or None
-        Its shape across the cable and the arc lengths of that, m.
-    """
-
-    share: dict[str, float]
-    step: int
-    place: float | None = None
-    across: list[float] | None = None
-    s: list[float] | None = None
-
-
-def whereabouts(observation: Observation, field: Array) -> Whereabouts:
-    """At which step and place, and in which kind of data, a whitened residual (N,) is largest."""
-    square = field**2
-    total = max(float(square.sum()), 1e-300)
-    share = {KINDS[k]: float(square[observation.rows.kind == k].sum()) / total for k in range(len(KINDS) - 1)}
-    by_step = np.bincount(observation.rows.step, weights=square)
-    strongest = int(np.argmax(by_step))
-    photo = next((photo for photo in observation.photos if photo.step == strongest), None)
+def across_cable(observation: Observation, field: Array, step: int) -> tuple[Array, Array] | None:
+    """Arc lengths (k,) m and the shape across the cable (k,) m of a whitened residual (N,) on the photo of a step."""
+    photo = next((photo for photo in observation.photos if photo.step == step), None)
     if photo is None:
-        return Whereabouts(share, strongest)
-    own = observation.rows.of_photo(strongest)
-    across = photo.basis @ linalg.lstsq(photo.whiten[:, 1:] @ photo.basis, observation.separated(field)[own])[0]
-    s = photo.sections.s
-    return Whereabouts(share, strongest, float(s[int(np.argmax(np.abs(across)))]), across.tolist(), s.tolist())
+        return None
+    own = observation.separated(field)[observation.rows.of_photo(step)]
+    return photo.sections.s, photo.basis @ linalg.lstsq(photo.whiten[:, 1:] @ photo.basis, own)[0]

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.statistics.score import Scores, admissible, descending, score
+from pipeline.diagnosis.statistics.twins import between_causes, cosines
+from pipeline.records import Array
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
 from rod.inverse.observation import Observation
 from rod.inverse.sensitivities import whole_residual
 from rod.inverse.simulation import run
-
-Array = NDArray[np.float64]
 
 VISIBLE = 1e-3
 """Surviving fraction below which a cause counts as invisible."""
@@ -63,6 +63,10 @@ class Suspicion:
     def of(self, cause: int) -> NDArray[np.int_]:
         """Directions of a cause."""
         return np.flatnonzero(self.owner == cause)
+
+    def closeness(self, of: NDArray[np.int_] | slice = slice(None)) -> Array:
+        """Largest ``|cos|`` (causes, causes) between the directions, all or some, of any two causes."""
+        return between_causes(cosines(self.scores.unit[:, of]), self.owner[of], len(self.causes))
 
     @property
     def usual(self) -> NDArray[np.int_]:

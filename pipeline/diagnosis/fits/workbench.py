@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS, Cause
 from pipeline.diagnosis.fits.extended import stiffness_change_linear
@@ -24,8 +23,6 @@ from rod.inverse.fit import Fit
 from rod.inverse.observation import ZERO_STD, Observation
 from rod.inverse.prediction import Facts, facts_of
 from rod.measurement import MeasuredTest
-
-Array = NDArray[np.float64]
 
 SCATTER = 1e-5
 """Of a displacement under load, m: a dial gauge or a spindle is read to so much, where photos tell the travel of a step
@@ -143,6 +140,5 @@ def scored(
 
 def _with_bends(fitted: Fit) -> Facts:
     """The test geometry with the largest bend that the cable had reached at each step, by the fitted model."""
-    rest = fitted.extension.base.pre_curvature(fitted.vector)
-    bends = [float(step.kappa.max()) - rest for step in fitted.run.steps]
+    bends = [float(step.kappa.max()) - fitted.pre_curvature for step in fitted.run.steps]
     return replace(fitted.extension.facts, bends=np.maximum.accumulate([0.0, *bends])[1:])

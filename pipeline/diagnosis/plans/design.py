@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.fits.extended import curve
@@ -20,8 +19,9 @@ from pipeline.diagnosis.plans.next_experiment import Protocol, protocols, still_
 from pipeline.diagnosis.plans.plan import Precision, planned_test
 from pipeline.diagnosis.posterior.detectable import Detectable, detectable
 from pipeline.diagnosis.posterior.error_grid import error_grid
-from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
+from pipeline.diagnosis.statistics.twins import nearest
 from pipeline.messages import DECIMAL, PER, Message, ended, entry, word
+from pipeline.records import Array
 from pipeline.result import Curve
 from pipeline.result.visited import html_table
 from pipeline.rounding import plain
@@ -36,8 +36,6 @@ from rod.inverse.observation import observe
 from rod.inverse.prediction import Facts
 from rod.inverse.simulation import run
 from rod.laws import StickSlip
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -184,9 +182,8 @@ def design(plan: Plan, settings: DiagnosisSettings | None = None) -> Design:
         raise ValueError(Message("misuse.no-step"))
     bench = planned_bench(plan, settings)
     table = _closeness(bench)
-    others = [
-        (protocol, _table(plan, protocol, settings)) for protocol in protocols(bench.facts) if not protocol.turned
-    ]
+    more = [protocol for protocol in protocols(bench.facts) if not protocol.turned]
+    others = [(protocol, _closeness(planned_bench(plan, settings, protocol.facts))) for protocol in more]
     grid = error_grid(bench.observation, bench.facts)
     found = detectable(grid, bench.observation, bench.base, bench.suspicion, power=settings.power)
     causes = [_cause_plan(bench, found, index, table, others, settings) for index in range(len(bench.suspicion.causes))]
@@ -231,13 +228,9 @@ def _facts(plan: Plan) -> Facts:
     )
 
 
-def planned_bench(plan: Plan, settings: DiagnosisSettings) -> Workbench:
-    """The planned test made without noise, its base model fitted and all causes scored."""
-    return _bench(plan, _facts(plan), settings)
-
-
-def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
-    """The planned test made without noise, its base model fitted and all causes scored."""
+def planned_bench(plan: Plan, settings: DiagnosisSettings, facts: Facts | None = None) -> Workbench:
+    """The planned test, or one of other ``facts``, made without noise, its base model fitted and all causes scored."""
+    facts = facts or _facts(plan)
     law = plan.law or StickSlip(plan.stiffness, plan.stiffness_bent, plan.transition)
     bends = np.linspace(0.0, 1.3 * facts.curvature_scale, 400)
     tangent = law.tangent(bends + plan.pre_curvature, plan.pre_curvature)
@@ -271,25 +264,13 @@ def _bench(plan: Plan, facts: Facts, settings: DiagnosisSettings) -> Workbench:
     test = planned_test(made, facts, precision, photos=plan.photos)
     observation = observe(test)
     observation = replace(observation, force_std=np.full(len(facts.branch), precision.force_std), force_freedom=0)
-    fitted = fit(
-        observation,
-        Extension(base, facts),
-        vector,
-        near=made,
-    )
+    fitted = fit(observation, Extension(base, facts), vector, near=made)
     return scored(test, observation, beside_errors(observation, fitted), SUSPECTS, settings)
-
-
-def _table(plan: Plan, protocol: Protocol, settings: DiagnosisSettings) -> Array:
-    """Cosines between causes if a protocol were added to the plan."""
-    bench = _bench(plan, protocol.facts, settings)
-    return _closeness(bench)
 
 
 def _closeness(bench: Workbench) -> Array:
     """Cosines (c, c) of the causes in their usual forms."""
-    suspicion, usual = bench.suspicion, bench.suspicion.usual
-    return between_causes(cosines(suspicion.scores.unit[:, usual]), suspicion.owner[usual], len(suspicion.causes))
+    return bench.suspicion.closeness(bench.suspicion.usual)
 
 
 def _cause_plan(

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.plans.plan import more_steps, planned_test, precision_of
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.messages import Message, entry
+from pipeline.records import Array
 from pipeline.result import NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.cause import Cause
@@ -29,8 +29,6 @@ from rod.inverse.observation import Observation, observe
 from rod.inverse.prediction import Facts
 from rod.inverse.sensitivities import sensitivities, whole_residual
 from rod.inverse.simulation import run
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,13 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records import Array
+from rod.inverse.observation import CHORD_STD
 from rod.inverse.prediction import Facts
 from rod.inverse.simulation import Run
 from rod.measurement import MeasuredShape, MeasuredStep, MeasuredTest
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def precision_of(test: MeasuredTest, force_std: Array) -> Precision:
 
     return Precision(
         force_std=median(list(force_std)),
-        chord_std=median(chords) if chords else 3e-5 * test.length,
+        chord_std=median(chords) if chords else CHORD_STD * test.length,
         section_std=median([float(np.median(shape.section_std)) for shape in shapes]),
         correlation_length=median([shape.correlation_length for shape in shapes]),
         systematic_std=median([shape.systematic_std for shape in shapes]),

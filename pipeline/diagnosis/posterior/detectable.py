@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ndtri
 
@@ -24,10 +23,9 @@ from pipeline.diagnosis.posterior.evidence import log_gain, told_of_columns
 from pipeline.diagnosis.posterior.hypotheses import SHARES
 from pipeline.diagnosis.posterior.unknowns import log_sum, solved_for
 from pipeline.diagnosis.statistics.score import span
+from pipeline.records import Array
 from rod.inverse.fit import Fit
 from rod.inverse.observation import Observation
-
-Array = NDArray[np.float64]
 
 LOUDEST = 40.0
 """Standard deviations: what is found neither at that size nor at the largest possible one is found at none."""

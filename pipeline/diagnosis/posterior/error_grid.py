@@ -42,12 +42,12 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, ndtr
 
 from pipeline.diagnosis.posterior.products import Models, Products, Spread, along, sums, with_rig
+from pipeline.records import Array
 from rod.inverse.common_errors import shared_light
 from rod.inverse.noise import by_axes, slow_errors
 from rod.inverse.observation import Observation, PhotoData
 from rod.inverse.prediction import Facts
 
-Array = NDArray[np.float64]
 Forms = Callable[[Array], Array]
 
 SLOW = {1.0: 0.6, 0.3: 0.2, 3.0: 0.2}

@@ -46,12 +46,11 @@ from pipeline.diagnosis.posterior.unknowns import (
     solved_for,
     solved_once,
 )
+from pipeline.records import Array
 from rod.inverse.cause import Cause
 from rod.inverse.extension import Term
 from rod.inverse.fit import Fit
 from rod.inverse.prediction import Facts
-
-Array = NDArray[np.float64]
 
 SIZES = np.geomspace(0.003, 10.0, 8)
 """Sizes s of an amount, in plausible ones: steps of a factor three, over which a normal density hardly changes."""

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import largest, largest_of
 from pipeline.diagnosis.causes.unnamed import UNNAMED
+from pipeline.records import Array
 from rod.inverse.cause import Profile, Variant
 from rod.inverse.fit import Fit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -135,10 +135,8 @@ def posterior(hypotheses: Sequence[Hypothesis], causes: Sequence[Cause]) -> Post
     for one in hypotheses:
         unnamed = one.found if one.found is not None and one.found.unnamed else None
         for something_else, value in ((False, one.plain), (True, one.rest)):
-            key, found = (
-                (frozenset(one.causes), something_else, unnamed),
-                (one.found is not None or not one.causes, value, one),
-            )
+            key = frozenset(one.causes), something_else, unnamed
+            found = one.found is not None or not one.causes, value, one
             if np.isfinite(value) and (key not in best or found[:2] > best[key][:2]):
                 best[key] = found
     many = max(len(causes), 1)

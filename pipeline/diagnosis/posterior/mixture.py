@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp, ndtr
 
 from pipeline.diagnosis.fits.extended import factor_of, stated
@@ -24,18 +23,15 @@ from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.evidence import SIZES, as_told, moments
 from pipeline.diagnosis.posterior.hypotheses import LEVEL, Posterior
+from pipeline.records import Array
 from pipeline.result import Curve, Widening, visited
 from rod.inverse.fit import Fit
-
-Array = NDArray[np.float64]
 
 NEGLIGIBLE = 0.002
 """Probability of a hypothesis or an error model that is left out; the band lets 5 % lie outside."""
 
 COLUMNS = 4
 """Factors that carry the correlation along the curvature; log f_EI goes by few and smooth ones."""
-
-NORMAL = 1.96
 
 
 class _Parts(NamedTuple):
@@ -92,7 +88,7 @@ def widening(
     weight = np.concatenate([part.weight for part in parts])
     mean = np.vstack([part.mean for part in parts])
     variance = np.vstack([np.sum(part.root**2, axis=2) for part in parts])
-    band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / NORMAL
+    band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / 1.96  # of a normal one
     # the curve's own band stands for what the same data leave unknown of its law
     known = np.einsum("np,pq,nq->n", here.rows, told, here.rows)
     extra = np.sqrt(np.maximum(band**2 - known, 0.0))

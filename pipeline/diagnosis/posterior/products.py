@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.fits.workbench import SCATTER
-
-Array = NDArray[np.float64]
+from pipeline.records import Array
 
 AS_RIGS_ARE, WORSE, EXACT = (0.0, 1.0), 3.0, 0.1
 SCATTERS = {0.0: 0.6, SCATTER: 0.2, 5.0 * SCATTER: 0.2}

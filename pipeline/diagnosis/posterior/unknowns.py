@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.products import Models, Products
+from pipeline.records import Array
 from rod.inverse.fit import Fit
+from rod.inverse.laws import AnyLaw
 from rod.law_prior import Conditioned, conditioned, inverse_root, least
-
-Array = NDArray[np.float64]
 
 NOTHING = 20.0
 """Of log p: what lies so far below the largest is nothing whatever the prior of an amount makes of it."""
@@ -65,8 +65,10 @@ solved_alone = lru_cache(maxsize=1)(solved_once)
 
 def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> Solved:
     """The unknowns of a fit for residuals (N, d) in the place of its own; ``more`` (N, k): further columns."""
-    several, size = residuals.shape[1], fitted.extension.base.law.size
-    models, normal = _models(grid, fitted, more, residuals)
+    form, several = fitted.extension.base.law, residuals.shape[1]
+    assert isinstance(form, AnyLaw)
+    size = form.size
+    models, normal = _models(grid, fitted, form, more, residuals)
     law = slice(several, several + size)
     amounts = _unknown(fitted)
     # places, waves and displacements have normal densities, whose factors of 2 pi cancel; law and K0 are in all alike
@@ -79,7 +81,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     squares = np.einsum("gdd->gd", products.own[:, :several, :several]) - np.sum(pull**2, axis=1)
     common = normal - 0.5 * (squares + (products.log_det + log_det)[:, None])
     a = fitted.vector[:size]
-    laws = tuple(conditioned(schur, pulls, a, one) for one in fitted.extension.base.law.families)
+    laws = tuple(conditioned(schur, pulls, a, one) for one in form.families)
     flat = common[:, None, None] + np.stack([one.evidence for one in laws], axis=1)
     own = half[:, :, np.array(amounts, dtype=int) - size - len(fitted.beyond_stated)].swapaxes(1, 2)
     alone, moves, covariances = (own @ pull).swapaxes(1, 2)[:, None], [], []
@@ -91,7 +93,7 @@ def solved_for(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> S
     return Solved(products, half, across, pull, laws, flat, amounts, np.stack(moves, axis=1), covariance)
 
 
-def _models(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tuple[Models, float]:
+def _models(grid: ErrorGrid, fitted: Fit, law: AnyLaw, more: Array, residuals: Array) -> tuple[Models, float]:
     """Columns in the order residuals, sensitivities, displacements and rig; and the logs of the heights of priors.
 
     What the fit holds the form of its law by, and its displacements, is one prior of many, and left out. How far a law
@@ -104,8 +106,8 @@ def _models(grid: ErrorGrid, fitted: Fit, more: Array, residuals: Array) -> tupl
     places = fitted.extension.places
     known = np.zeros((len(stated) + len(places) + 1, columns.shape[1]))
     known[: len(stated)] = stated
-    falls, by = base.law.softening(fitted.vector[: base.law.size])
-    known[-1, :several], known[-1, several : several + base.law.size] = -falls, by
+    falls, by = law.softening(fitted.vector[: law.size])
+    known[-1, :several], known[-1, several : several + law.size] = -falls, by
     for row, (at, middle, std) in enumerate(places, start=len(stated)):
         known[row, :several] = (middle - fitted.vector[at]) / std
         known[row, several + at - len(beyond)] = 1.0 / std
@@ -121,7 +123,7 @@ def of_known_size(grid: ErrorGrid, fitted: Fit) -> tuple[Array, Array]:
 
 def _by_one_prior(fitted: Fit, models: Models, several: int) -> Array:
     """Log p (G, d) by the one prior of the law that the fit holds it by, flat in the amounts, up to a constant."""
-    prior, size = fitted.extension.base.law.prior(), fitted.extension.base.law.size
+    prior, size = fitted.extension.base.law.prior, fitted.extension.base.law.size
     held = np.hstack([np.repeat(-prior @ fitted.vector[:size, None], several, axis=1), prior])
     known, found = held.T @ held, []
     for some in np.array_split(np.arange(len(models.of)), len(models.of) // AT_ONCE + 1):

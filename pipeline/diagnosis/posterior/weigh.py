@@ -5,19 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.unnamed import UNNAMED
 from pipeline.diagnosis.fits.search import Suspicion
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
-from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence, evidences
+from pipeline.diagnosis.posterior.evidence import Evidence, WithColumn, evidence
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.hypotheses import Hypothesis
 from rod.inverse.fit import Fit
 from rod.inverse.prediction import Facts
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,26 +36,18 @@ def weighed(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion | None = None) ->
     """Evidence of a fit, and of every cause beside it that ``suspicion``, the scores about it, has forms of."""
     if suspicion is None or not suspicion.terms:
         return Weighed(evidence(grid, fitted)[0], {})
-    return _of_causes(suspicion, [evidence(grid, fitted, suspicion.terms, suspicion.columns)])[0]
+    return of_causes(suspicion, *evidence(grid, fitted, suspicion.terms, suspicion.columns))
 
 
-def weighed_draws(grid: ErrorGrid, fitted: Fit, suspicion: Suspicion, residuals: Array) -> list[Weighed]:
-    """The same for several residuals (N, d) in the place of the fit's own."""
-    return _of_causes(suspicion, evidences(grid, fitted, residuals, suspicion.terms, suspicion.columns))
-
-
-def _of_causes(suspicion: Suspicion, found_of: list[tuple[Evidence, WithColumn]]) -> list[Weighed]:
-    """From forms to causes."""
-    found = []
-    for own, added in found_of:
-        further = {}
-        for cause in range(len(suspicion.causes)):
-            forms = suspicion.of(cause)
-            if forms.size:
-                plain, rest = (float(np.logaddexp.reduce(values[forms]) - np.log(forms.size)) for values in added)
-                further[cause] = plain, rest
-        found.append(Weighed(own, further))
-    return found
+def of_causes(suspicion: Suspicion, own: Evidence, added: WithColumn) -> Weighed:
+    """From the evidence of forms, each beside a fit, to that of causes."""
+    further = {}
+    for cause in range(len(suspicion.causes)):
+        forms = suspicion.of(cause)
+        if forms.size:
+            plain, rest = (float(np.logaddexp.reduce(values[forms]) - np.log(forms.size)) for values in added)
+            further[cause] = plain, rest
+    return Weighed(own, further)
 
 
 def refitted(grid: ErrorGrid, found: Explanation, facts: Facts) -> Hypothesis:

@@ -7,12 +7,13 @@ import numpy as np
 from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.unnamed import PLACE, POINTS, UNKNOWN
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.fits.maps import whereabouts
+from pipeline.diagnosis.fits.maps import across_cable
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.evidence import something_else
 from pipeline.messages import Message
 from pipeline.result import LeftoverPart
 from rod.inverse.fit import Fit
+from rod.inverse.observation import KINDS
 
 
 def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
@@ -20,11 +21,14 @@ def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
     observation, fitted = bench.observation, conclusion.fitted(bench)
     field, astray = something_else(conclusion.grid, fitted)
     unnamed = _unnamed(bench, fitted)
-    found = whereabouts(observation, field)
-    step = bench.test.steps[found.step]
-    loudest = max(found.share, key=lambda kind: found.share[kind])
-    placed = found.place is not None and loudest == "shape"
-    place = Message("left.place", at_m=found.place) if placed else ""
+    square = field**2
+    total = max(float(square.sum()), 1e-300)
+    share = {KINDS[k]: float(square[observation.rows.kind == k].sum()) / total for k in range(len(KINDS) - 1)}
+    strongest = int(np.argmax(np.bincount(observation.rows.step, weights=square)))
+    shape, step = across_cable(observation, field, strongest), bench.test.steps[strongest]
+    at = None if shape is None else float(shape[0][int(np.argmax(np.abs(shape[1])))])
+    loudest = max(share, key=lambda kind: share[kind])
+    place = Message("left.place", at_m=at) if at is not None and loudest == "shape" else ""
     said = unnamed or Message("left.over", where=f"{loudest}s", step=step.step, branch=step.branch, place=place)
     if astray and not unnamed:
         said = Message("left.astray", size_m=astray, step=step.step, branch=step.branch)
@@ -33,10 +37,10 @@ def described(bench: Workbench, conclusion: Conclusion) -> LeftoverPart:
         probability=conclusion.posterior.total(something_else=True),
         chi2=float(field @ field),
         noise_factor=observation.photo_noise.factor,
-        share=found.share,
-        place=found.place,
-        shape_m=[] if found.s is None else found.across,
-        s_m=[] if found.s is None else found.s,
+        share=share,
+        place=at,
+        shape_m=[] if shape is None else shape[1].tolist(),
+        s_m=[] if shape is None else shape[0].tolist(),
         step=step.step,
     )
 

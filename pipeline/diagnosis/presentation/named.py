@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.explanations.conclusion import Conclusion
-from pipeline.diagnosis.fits.extended import curve, curve_change, forms, stiffness_change
+from pipeline.diagnosis.fits.extended import curve_change, forms, stiffness_change
 from pipeline.diagnosis.fits.identified_again import Identified
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.posterior.mixture import centre_of, widening
 from pipeline.messages import entry
 from pipeline.result import CausePart, Curve, HypothesisPart, TwinPart, Widening
-from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.fit import FITS, Fit
 
 
@@ -95,11 +94,6 @@ def hypotheses(bench: Workbench, conclusion: Conclusion) -> tuple[list[Hypothesi
 
 TOLD = 1e-6
 """Probability below which a hypothesis is not told; all of these together change no digit that is shown."""
-
-
-def extended_curve(again: Identified, settings: DiagnosisSettings) -> Curve:
-    """f_EI of the extended model, with the law's smoothness in its band."""
-    return curve(again.fitted, covariance=again.covariance, other=again.other)
 
 
 def all_believed(

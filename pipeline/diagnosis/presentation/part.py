@@ -21,18 +21,16 @@ from pipeline.diagnosis.fits.identified_again import identified_again
 from pipeline.diagnosis.fits.maps import residual_map
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.plans.next_experiment import next_experiment
-from pipeline.diagnosis.posterior.words import verdict
 from pipeline.diagnosis.presentation.leftover import described
 from pipeline.diagnosis.presentation.named import (
     all_believed,
     change_of_stiffness,
-    extended_curve,
     hypotheses,
     known_to,
     named_causes,
 )
 from pipeline.diagnosis.presentation.table import blind_spots, confusable, seen_at_plausible_size, table
-from pipeline.diagnosis.words import could_have_been_seen, headline
+from pipeline.diagnosis.words import could_have_been_seen, headline, verdict
 from pipeline.messages import Message
 from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -73,7 +71,7 @@ def present(
         if conclusion.unmodelled and not accepted.unnamed:
             # the nearest cause may not be there at all: without it the data have another answer
             again = replace(again, other=bench.base)
-    extended = None if again is None else extended_curve(again, settings)
+    extended = None if again is None else curve(again.fitted, covariance=again.covariance, other=again.other)
     causes = named_causes(bench, conclusion, again, extended)
     word = verdict(
         found=accepted is not None,

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.law import LAW
 from pipeline.diagnosis.explanations.conclusion import Conclusion
@@ -19,13 +18,10 @@ from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.detectable import detectable
 from pipeline.diagnosis.posterior.explanation import Explanation
 from pipeline.diagnosis.statistics.score import adjusted_p
-from pipeline.diagnosis.statistics.twins import between_causes, cosines, nearest
+from pipeline.diagnosis.statistics.twins import nearest
 from pipeline.messages import entry
 from pipeline.result import BlindSpot, CauseRow, GainPart
 from pipeline.settings.diagnosis import DiagnosisSettings
-
-Array = NDArray[np.float64]
-
 
 TWINS_SHOWN = 8
 """Causes in the table of cosines; more cannot be read."""
@@ -35,7 +31,7 @@ def table(
     bench: Workbench, conclusion: Conclusion, settings: DiagnosisSettings, *, gain: GainPart | None
 ) -> list[CauseRow]:
     """One row for every cause, the loudest first; ``gain`` is that of the accepted explanation."""
-    twin, closeness = nearest(_closeness(bench))
+    twin, closeness = nearest(bench.suspicion.closeness())
     refitted = {e.causes[0]: e for e in conclusion.singles}
     found_from = detectable(conclusion.grid, bench.observation, bench.base, bench.suspicion, power=settings.power)
     rows = []
@@ -109,12 +105,6 @@ def _finite(value: float) -> float:
     return value if np.isfinite(value) else 0.0
 
 
-def _closeness(bench: Workbench) -> Array:
-    """Largest ``|cos|`` (causes, causes) between the directions of any two causes."""
-    suspicion = bench.suspicion
-    return between_causes(cosines(suspicion.scores.unit), suspicion.owner, len(suspicion.causes))
-
-
 def seen_at_plausible_size(bench: Workbench, rows: list[CauseRow]) -> list[CauseRow]:
     """Rows of causes that a plausible size would have shown, the clearest first; none that the law may hide."""
     told = [cause for k, cause in enumerate(bench.suspicion.causes) if not bench.in_law.of(k).size]
@@ -137,7 +127,7 @@ def blind_spots(bench: Workbench, seen: list[CauseRow], settings: DiagnosisSetti
 
 def confusable(bench: Workbench, conclusion: Conclusion) -> dict[str, dict[str, float]]:
     """Cosines among the loudest causes and whatever is in the set of names."""
-    suspicion, closeness = bench.suspicion, _closeness(bench)
+    suspicion, closeness = bench.suspicion, bench.suspicion.closeness()
     loudness = np.zeros(len(suspicion.causes))
     np.maximum.at(loudness, suspicion.owner, suspicion.statistic)
     chosen = list(dict.fromkeys(cause for names in conclusion.classes for cause in names))

@@ -19,14 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
-Array = NDArray[np.float64]
-
-
-SIGNIFICANT = 3.0
-"""Standard deviations of a chi-square from which the base model has an excess that can be shared out."""
+from pipeline.records import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +37,6 @@ class Fold:
     outside: Array
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Share of the excess misfit removed on held-out steps; ``excess`` is the base model's, in chi-square."""
-
-    removed: float
-    interval: tuple[float, float]
-    excess: float
-
-
 def folds_by_level(displacement: Array, branch: tuple[str, ...], *, same: float) -> list[list[int]]:
     """Steps grouped by displacement (closer than ``same``, m); the mounted step is never left out."""
     steps = [i for i in np.argsort(displacement, kind="stable") if branch[i] != "mounted"]
@@ -63,8 +49,8 @@ def folds_by_level(displacement: Array, branch: tuple[str, ...], *, same: float)
     return groups
 
 
-def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> HeldOut | None:
-    """Share of the excess removed over all folds, with its 95 % interval.
+def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> tuple[float, tuple[float, float]] | None:
+    """Share of the excess removed over all folds, and its 95 % interval.
 
     None where the base model's excess on them is within three standard deviations of chance: a share of nothing.
     """
@@ -72,7 +58,7 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
     before, after = (np.concatenate(residuals) for residuals in zip(*whitened, strict=True))
     count = len(before)
     excess = float(before @ before) - count
-    if excess <= SIGNIFICANT * np.sqrt(2.0 * count):
+    if excess <= 3.0 * np.sqrt(2.0 * count):
         return None
     removed = float(np.clip((float(before @ before) - float(after @ after)) / excess, 0.0, 1.0))
     # what the extension takes away is the signal; noise is drawn anew, as large as what it leaves
@@ -85,7 +71,7 @@ def held_out(folds: list[Fold], *, draws: int, rng: np.random.Generator) -> Held
     base_chi2 = gained + along**2 + level**2 * rng.chisquare(max(count - 1, 1), draws)
     share = np.clip(gained / np.maximum(base_chi2 - count, 0.5 * excess), 0.0, 1.0)
     low, high = np.quantile(share, [0.025, 0.975])
-    return HeldOut(removed, (float(min(low, removed)), float(max(high, removed))), excess)
+    return removed, (float(min(low, removed)), float(max(high, removed)))
 
 
 def whitened_by_prediction(fold: Fold) -> tuple[Array, Array]:

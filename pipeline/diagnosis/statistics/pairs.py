@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pipeline.records import Array
 
 COLLINEAR = 0.985
 """|cos| above which the split between two causes is noise."""

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, special
 
-Array = NDArray[np.float64]
+from pipeline.records import Array
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,14 @@ class Scores:
         return int(np.count_nonzero(self.norm))
 
 
-def span(jacobian: Array, *, tolerance: float = 1e-10) -> Array:
+def span(jacobian: Array) -> Array:
     """Orthonormal basis (n, rank) of the columns of ``jacobian``; columns are scaled first, so units do not matter."""
     size = np.linalg.norm(jacobian, axis=0)
     scaled = jacobian[:, size > 0.0] / size[size > 0.0]
     if scaled.shape[1] == 0:
         return np.zeros((jacobian.shape[0], 0))
     left, weight, _ = linalg.svd(scaled, full_matrices=False)
-    return np.asarray(left[:, weight > tolerance * weight[0]])
+    return np.asarray(left[:, weight > 1e-10 * weight[0]])
 
 
 def score(residual: Array, jacobian: Array, columns: Array, *, visible: float = 1e-6) -> Scores:
@@ -79,10 +79,6 @@ def score(residual: Array, jacobian: Array, columns: Array, *, visible: float = 
         Whitened sensitivities to the candidates.
     visible : float
         Surviving fraction below which a direction counts as invisible: its score is 0 and its std infinite.
-
-    Returns
-    -------
-    Scores
     """
     basis = span(jacobian)
     kept = columns - basis @ (basis.T @ columns)

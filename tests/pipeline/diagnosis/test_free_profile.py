@@ -16,7 +16,7 @@ from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import FITS, evaluated
+from rod.inverse.fit import FITS, evaluated, shown
 
 SETTINGS = DiagnosisSettings()
 PROFILES = ("pre_curvature_varying", "stiffness_varying")
@@ -87,9 +87,10 @@ def test_columns_of_profiles_are_those_of_difference_quotients(name, turned):
     for variant in (wave(3), forms()[4]):
         extension = Extension(bench.base.extension.base, facts, (Term(cause, variant),), turned=turned)
         vector = extension.start(bench.base.vector, (0.3 * cause.plausible(facts),))
-        here, at = evaluated(bench.observation, extension, vector, bench.base.run), extension.amounts_at[0]
+        at, near = extension.amounts_at[0], bench.base.run
+        here = evaluated(bench.observation, extension, shown(bench.observation, extension, vector.copy(), near))
         vector[at] += 1e-3 * cause.plausible(facts)
-        there = evaluated(bench.observation, extension, vector, here.run)
+        there = evaluated(bench.observation, extension, shown(bench.observation, extension, vector, here.run))
         quotient = (here.residual - there.residual) / (1e-3 * cause.plausible(facts))
         assert np.linalg.norm(here.jacobian[:, at] - quotient) < 3e-4 * np.linalg.norm(quotient)
 

@@ -21,8 +21,8 @@ from pipeline.diagnosis.posterior.evidence import SIZES, as_told, evidence, evid
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
 from pipeline.diagnosis.posterior.products import MOVED
 from pipeline.diagnosis.posterior.unknowns import of_known_size
-from pipeline.diagnosis.posterior.weigh import weighed_draws
-from pipeline.diagnosis.posterior.words import verdict
+from pipeline.diagnosis.posterior.weigh import of_causes
+from pipeline.diagnosis.words import verdict
 from pipeline.faults import faults_of_input
 from rod.inverse.base import RIG
 from rod.inverse.noise import by_axes
@@ -201,7 +201,9 @@ def believed(bench, grid, fields):
     residuals, rows = np.zeros((len(bench.base.residual), len(fields))), bench.observation.rows.count
     for seed, field in enumerate(fields):
         residuals[:rows, seed] = field + np.random.default_rng(seed).standard_normal(rows)
-    for found in weighed_draws(grid, bench.base, bench.suspicion, residuals):
+    seen = bench.suspicion
+    for one in evidences(grid, bench.base, residuals, seen.terms, seen.columns):
+        found = of_causes(seen, *one)
         further = [Hypothesis((cause,), *values) for cause, values in found.further.items()]
         yield posterior([Hypothesis((), found.own.plain, found.own.rest), *further], list(found.further))
 
