@@ -85,6 +85,8 @@ class RoughCable:
         The cable seems to go on beyond an end of it.
     evidence : Evidence
         For being a cable, along the path.
+    rival : RoughCable or None
+        As it is seen in other colours: measured instead, where this one is refused.
     """
 
     image: str
@@ -101,6 +103,7 @@ class RoughCable:
     findings: tuple[Finding, ...] = ()
     goes_on: bool = False
     evidence: Evidence = field(default_factory=Evidence)
+    rival: RoughCable | None = None
 
     @property
     def axes(self) -> tuple[Bearing, Bearing]:

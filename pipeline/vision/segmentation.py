@@ -155,7 +155,11 @@ def _found(
     if alike is None:
         return photo, found
     in_one = _read(alike, stand_out(alike, reduction, window=window), wanted, cable)
-    return (alike, in_one) if _is_better(in_one, found, cable.diameter_px, near) else (photo, found)
+    pairs = [(photo, found), (alike, in_one)]
+    (seen, chosen), (_, other) = reversed(pairs) if _is_better(in_one, found, cable.diameter_px, near) else pairs
+    if isinstance(chosen, RoughCable) and isinstance(other, RoughCable):
+        chosen = replace(chosen, rival=other)
+    return seen, chosen
 
 
 def _is_better(

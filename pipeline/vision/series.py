@@ -236,6 +236,7 @@ def _reversed(found: RoughCable | Rejected) -> RoughCable | Rejected:
         visible=(last - found.visible[1], last - found.visible[0]),
         left=found.right,
         right=found.left,
+        rival=None if found.rival is None else _reversed(found.rival),
     )
 
 

@@ -22,11 +22,12 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
     """The photos of a series with the cables found without what stands still in it.
 
     Twice: by the colour of what moves in which the farthest photo shows the likeliest cable, then by that of the cables
-    found. A cable that was seen as well before stays as it was found.
+    found. A cable that was seen on the same course before, as long, stays as it was found.
     """
     usable = {k: shot.size for k, shot in enumerate(shots) if shot.size is not None and not _is_spoilt(shot)}
     alike = [k for k, size in usable.items() if size in dict(Counter(usable.values()).most_common(1))]
-    doubted = count_alike([shots[k] for k in alike], search.settings.series.max_length_deviation) < len(alike)
+    most = search.settings.series.max_length_deviation
+    doubted = count_alike([shots[k] for k in alike], most) < len(alike)
     if not doubted or len(alike) < _LEAST_PHOTOS:
         return shots
     chosen = sorted({alike[i] for i in np.linspace(0, len(alike) - 1, _MOST_PHOTOS).astype(int)})
@@ -45,7 +46,7 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
         rounds.append(_searched(search, sought, photos, Ground.of(held, colour_along(middles, held[0]))))
     settled = shots
     for found in rounds:
-        better = {k: cable for k, cable in found.items() if not _as_well(settled[k].found, cable)}
+        better = {k: cable for k, cable in found.items() if not _is_same(settled[k].found, cable, most)}
         settled = [replace(shot, found=better[k]) if k in better else shot for k, shot in enumerate(settled)]
     return settled
 
@@ -69,6 +70,7 @@ def _is_spoilt(shot: Shot) -> bool:
     return isinstance(shot.found, Rejected) and shot.found.code in ("photo/blank", "photo/blur")
 
 
-def _as_well(old: RoughCable | Rejected, new: RoughCable) -> bool:
-    """True if it is the same cable with no more evidence."""
-    return isinstance(old, RoughCable) and lies_on(old, [new.path_px]) and old.evidence.value >= new.evidence.value
+def _is_same(old: RoughCable | Rejected, new: RoughCable, most: float) -> bool:
+    """True if it was on the same course before, as long to a relative deviation."""
+    same = isinstance(old, RoughCable) and lies_on(old, [new.path_px])
+    return same and abs(new.length_px / old.length_px - 1.0) <= most

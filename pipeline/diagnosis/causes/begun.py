@@ -41,7 +41,7 @@ class Begun(Cause):
         return SHARE / len(BEGUN) / len(self.variants(facts))
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """From each hold under load on but the first; what grows from there is a drift, at the last it only begins."""
+        """From each hold under load on but the first, and growing from each but the ``known`` ones and the last."""
         since = [Variant(at=float(k), setting=str(k)) for k in facts.pushed]
         begins, grows = (
             [replace(form, label=label, width=width) for form in some]

@@ -148,6 +148,16 @@ def follow_cable(
     axis_parallax_std : relative
         As in `pipeline.records.Traces`.
     """
+    cable = _in_its_colours(rough, plane, diameter_m, axis_parallax_std)
+    if isinstance(cable, Rejected) and rough.rival is not None:
+        other = follow_cable(rough.rival, plane=plane, diameter_m=diameter_m, axis_parallax_std=axis_parallax_std)
+        return cable if isinstance(other, Rejected) else other
+    return cable
+
+
+def _in_its_colours(
+    rough: RoughCable, plane: PlaneMap, diameter_m: float | None, axis_parallax_std: float
+) -> Followed | Rejected:
     half_width = rough.half_width_px
     if diameter_m is not None:
         scale = median(plane.local_scale(rough.path_px[:: max(1, len(rough.path_px) // 9)]))
