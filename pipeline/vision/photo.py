@@ -21,7 +21,7 @@ from PIL import ImageOps
 
 from pipeline.messages import Message, by_system
 from pipeline.records import Rejected
-from pipeline.settings.vision.photo import PhotoSettings
+from pipeline.settings.vision import PhotoSettings
 from pipeline.vision.photo_file import BROKEN, is_sound, is_whole, opened, read_header
 
 Pixels = NDArray[np.uint8 | np.uint16]

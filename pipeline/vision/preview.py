@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Preview
-from pipeline.settings.vision.photo import PreviewSettings
+from pipeline.settings.vision import PreviewSettings
 from pipeline.vision.median import quantile
 from pipeline.vision.photo import Photo, reduce_area, straightened
 from pipeline.vision.polyline import arc_lengths

@@ -27,8 +27,7 @@ from pipeline.records import (
     doubtful,
     said_once,
 )
-from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.series import SeriesSettings
+from pipeline.settings.vision import SeriesSettings, VisionSettings
 from pipeline.vision.bearings.covers import VERTICAL_DEG
 from pipeline.vision.bearings.steady import wandering_px
 from pipeline.vision.centerline.axes_of_series import told_by_others

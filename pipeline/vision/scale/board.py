@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from pipeline.errors import InputError
 from pipeline.messages import Message
 from pipeline.records import Array, Board, CameraSpec, Finding, Rejected, Scale, doubtful, inferred
-from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.settings.vision import CalibrationSettings, VisionSettings
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.scale.calibration import Calibration
 from pipeline.vision.scale.corners import refine_corners

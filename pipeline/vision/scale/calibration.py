@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.messages import Message
 from pipeline.records import Array, Centerline, Finding, Scale, Specimen, inferred
-from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.settings.vision import CalibrationSettings
 from pipeline.vision.median import SURE_SIGMAS
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
