@@ -28,14 +28,7 @@ _WIDTHS = np.geomspace(4.0, 80.0, 10)
 
 
 def with_hints(photo: Photo, cable: Cable, hints: PhotoHints) -> tuple[Photo, Cable]:
-    """The photo and what is known of its cable, by what a person says.
-
-    Parameters
-    ----------
-    photo : Photo
-    cable : Cable
-    hints : PhotoHints
-    """
+    """The photo and what is known of its cable, by what a person says."""
     for polygon in hints.exclude_px:
         photo = _painted(photo, np.array(polygon))
     ends = hints.ends_px

@@ -67,7 +67,6 @@ class RoughCable:
     visible : (first, last)
         Indices into ``path_px``, both included: the part in which the cable is seen. Outside, the path runs straight to
         the bearing axis and carries no information.
-    left, right : Bearing
     half_width_px : px
         Half the width of the cable's mask, median along the cable.
     grey : (h, w) float32
@@ -80,7 +79,6 @@ class RoughCable:
         Median step between ground and cable, positive.
     weights : tuple of float
         Colour projection: weight of each channel as stored (one for grey photos).
-    findings : tuple of Finding
     goes_on : bool
         The cable seems to go on beyond an end of it.
     evidence : Evidence

@@ -54,17 +54,12 @@ def find_cable(
 
     Parameters
     ----------
-    photo : Photo
     cable : Cable, optional
         What is known of it.
     near : RoughCable, optional
         The cable on a neighbouring photo of the series: only its surroundings are searched first.
     hints : PhotoHints, optional
         What a person says about this photo.
-
-    Returns
-    -------
-    RoughCable or Rejected
     """
     cable = Cable() if cable is None else cable
     if hints is not None:

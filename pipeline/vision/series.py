@@ -60,11 +60,6 @@ _MIN_TRAVEL_M = 2e-4  # m; below it rounding of the log and play of the bearings
 def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     """Trace every photo of a specimen.
 
-    Parameters
-    ----------
-    specimen : Specimen
-    settings : VisionSettings
-
     Returns
     -------
     Traces

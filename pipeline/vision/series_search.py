@@ -37,9 +37,6 @@ class Search:
 
     Attributes
     ----------
-    specimen : Specimen
-    settings : VisionSettings
-    calibration : Calibration or None
     cover_px : px or None
         Diameter of covers that were seen where nobody gave it.
     """

@@ -162,10 +162,6 @@ def of_one_size(shots: list[Shot]) -> tuple[list[Shot], tuple[Finding, ...]]:
     own. On one that was turned by a quarter left and right are told by what was up and down: its bearings may change
     places, and everything along the cable with them.
 
-    Parameters
-    ----------
-    shots : list of Shot
-
     Returns
     -------
     list of Shot

@@ -42,10 +42,8 @@ def with_width_seen(
 
     Parameters
     ----------
-    specimen : Specimen
     traces : Traces
         With the diameter as stated.
-    settings : VisionSettings
     retrace : callable
         Trace a series.
 

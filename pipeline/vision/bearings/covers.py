@@ -72,7 +72,6 @@ def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> 
 
     Parameters
     ----------
-    photo : Photo
     end : CableEnd
         Where the cable's mask ends: at the rim, or beyond it where cover and cable look alike.
     radius : Radius

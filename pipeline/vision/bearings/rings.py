@@ -44,10 +44,8 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
 
     Parameters
     ----------
-    photo : Photo
     rim : Circle
         Fitted to the rim.
-    expected : Radius
 
     Returns
     -------
@@ -113,15 +111,10 @@ def find_marks(photo: Photo, places: Array, reach: float) -> list[Circle]:
 
     Parameters
     ----------
-    photo : Photo
     places : (k, 2) px
         Where its centre may be, closer together than a cell of the search (``MARK_CELLS`` to the reach).
     reach : px
         Largest radius of the ring.
-
-    Returns
-    -------
-    list of Circle
     """
     reduction = max(1, int(reach / MARK_CELLS))
     low = np.maximum(np.floor(places.min(axis=0) - 1.2 * reach).astype(int), 0)

@@ -57,10 +57,8 @@ def continue_to_axes(
 
     Parameters
     ----------
-    fit : CurveFit
     covariance : (p, p)
         Of the curve's parameters, the light's errors included.
-    chord : ChordFrame
     width : m
         Of the cable.
     told : AxesTold, optional

@@ -39,7 +39,6 @@ class CurveFit:
 
     Attributes
     ----------
-    curve : PlaneCurve
     smooth : Smooth
         Covariance of q and gain on the points' normal displacements.
     points : (n, 2)

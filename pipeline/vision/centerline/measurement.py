@@ -61,9 +61,6 @@ class Followed:
 
     Attributes
     ----------
-    rough : RoughCable
-    chord : ChordFrame
-    sections : Sections
     width : (n,) m
         Of the cable on the sections.
     fit : CurveFit
@@ -224,8 +221,6 @@ def centerline_of(
 
     Parameters
     ----------
-    followed : Followed
-    settings : VisionSettings
     told : AxesTold, optional
         What the other photos of its series tell of how the cable passes the axes.
     waves : Waves, optional

@@ -36,10 +36,8 @@ class Calibration:
 
     Attributes
     ----------
-    plane : PlaneMap
     scale : Scale
         In the middle of the picture; its standard deviation is all of it.
-    findings : tuple of Finding
     uniform_std : relative
         Part of that standard deviation which is the same everywhere: what ``aside`` does not hold.
     aside : tuple of PlaneMap
@@ -66,7 +64,6 @@ def from_found(
 
     Parameters
     ----------
-    specimen : Specimen
     found : list of RoughCable
         At least one.
     displacements : (n,) m

@@ -61,7 +61,6 @@ class PlaneMap:
     ----------
     homography : (3, 3)
         From undistorted pixels to the plane in m.
-    lens : Lens or None
     """
 
     homography: Array
@@ -104,7 +103,6 @@ class ChordFrame:
 
     Attributes
     ----------
-    plane : PlaneMap
     origin : (2,) m
         Left bearing axis on the plane.
     rotation : (2, 2)

@@ -47,7 +47,6 @@ class PlaneFit:
 
     Attributes
     ----------
-    plane : PlaneMap
     rms_px : float px
         Of the corners off the fit.
     scale_std, border_std : float
@@ -55,7 +54,6 @@ class PlaneFit:
         border.
     distance_m : float or None
         Of the camera, if the photos tell.
-    lens_source : Message
     aside : tuple of PlaneMap
         Maps one standard deviation away along each principal direction of the fit's covariance.
     photo : str

@@ -149,7 +149,6 @@ def more_beyond(
 
     Parameters
     ----------
-    standout : Standout
     cut : CrossCut
         The strip's cross-cuts.
     axes : pair of Bearing

@@ -55,7 +55,6 @@ def soft_beside_sharp(closeup: Closeup, middle: Array, across: Array, width: flo
 
     Parameters
     ----------
-    closeup : Closeup
     middle, across : (n, 2) px, -
         Along the midline as measured, and unit vectors across it.
     width : px

@@ -247,7 +247,6 @@ def find_flanks(
         Evenly spaced.
     width : cells
         The cable's if ``known``, else that of the mask, which a shadow may have widened.
-    known : bool
     search : widths
         How far beside the middle of the picture the pair's middle may lie.
 
