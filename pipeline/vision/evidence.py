@@ -141,11 +141,13 @@ def weigh(
     noise = float(np.hypot(scatter(ground - np.median(ground, axis=0), 0.0), _LEVEL))
     weaker = np.min(_steps(blocks, offset, np.array([-0.5, 0.5]) * width, reach), axis=1) / noise
     edges = median(weaker)
+    along = _wave(widths)
+    calm = np.convolve(widths, np.ones(along) / along, mode="valid") if len(widths) > along else widths
     return Evidence(
         length=length,
         seen=float(np.mean(weaker > (min(SURE_SIGMAS, 0.5 * edges) if known else SURE_SIGMAS))) * share,
         edges=edges,
-        unsteady=_unsteady(widths, width, std),
+        unsteady=scatter(calm) / max(_CALM_PX, _CALM * width, 1.5 * std),
         crossed=crossed,
     )
 
@@ -157,12 +159,6 @@ def _steps(blocks: Array, offset: Array, places: Array, reach: int) -> Array:
     right = (total[:, column + reach + 1] - total[:, column + 1]) / reach
     left = (total[:, column] - total[:, column - reach]) / reach
     return np.asarray((right - left) * np.sign(places))
-
-
-def _unsteady(widths: Array, width: float, std: float) -> float:
-    along = _wave(widths)
-    calm = np.convolve(widths, np.ones(along) / along, mode="valid") if len(widths) > along else widths
-    return scatter(calm) / max(_CALM_PX, _CALM * width, 1.5 * std)
 
 
 def _wave(widths: Array) -> int:

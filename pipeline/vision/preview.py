@@ -40,8 +40,7 @@ def with_strip(preview: Preview, line: Centerline, rough: RoughCable, settings: 
     s = arc_lengths(path)
     along = np.linspace(0.0, s[-1], settings.long_side_px)
     points = np.column_stack([np.interp(along, s, path[:, 0]), np.interp(along, s, path[:, 1])])
-    _, normal = path_normals(points)
-    normal *= -1.0 if line.mirrored else 1.0
+    normal = path_normals(points) * (-1.0 if line.mirrored else 1.0)
     half = _STRIP_WIDTHS * 2.0 * rough.half_width_px
     across = np.linspace(-half, half, _STRIP_HEIGHT_PX)
     strip = straightened(rough.grey, points - rough.origin_px, normal, across)[..., 0].T

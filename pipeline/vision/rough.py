@@ -106,6 +106,11 @@ class RoughCable:
         return self.left, self.right
 
     @property
+    def seen_px(self) -> Array:
+        """The part of the path ``(m, 2)`` in which the cable is seen, px."""
+        return self.path_px[self.visible[0] : self.visible[1] + 1]
+
+    @property
     def closeup(self) -> Closeup:
         """The window in which the cable is dark."""
         return Closeup(self.grey if self.dark else -self.grey, self.origin_px)

@@ -68,8 +68,8 @@ def find_cable(
     if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness):
         return found
     # The two flanks of a round sheath, its highlight or the shadow beside it are strips as long as the cable is.
-    widths = [2.0 * near.half_width_px] if near is not None else _widths(photo, cable.slenderness)
-    for width in widths:
+    width = 2.0 * near.half_width_px if near is not None else _width_of_longest(photo, cable.slenderness)
+    if width is not None:
         again = _find_near(photo, replace(cable, diameter_px=width), near)
         if _is_slender(again, cable.slenderness):
             return again
@@ -114,15 +114,15 @@ def _slenderness(found: RoughCable) -> float:
     return 0.5 * found.length_px / found.half_width_px
 
 
-def _widths(photo: Photo, slenderness: float) -> list[float]:
-    """Widths (px) the cable has by its stated slenderness if the longest strips seen are as long as it is."""
+def _width_of_longest(photo: Photo, slenderness: float) -> float | None:
+    """Width (px) the cable has by its stated slenderness if the longest strip seen is as long as it is."""
     standout = stand_out(photo, choose_reduction(photo.size, None))
     wanted = _wanted(standout, Cable())
     for readings in read_photo(standout, wanted):
         longest = max(reading.longest for reading in readings)
         if longest >= wanted.least_length:
-            return [longest * standout.reduction / slenderness]
-    return []
+            return longest * standout.reduction / slenderness
+    return None
 
 
 def _find_in(photo: Photo, cable: Cable, window: Window | None, near: RoughCable | None) -> RoughCable | Rejected:
@@ -281,9 +281,7 @@ def _length_beyond(path: Array, best: RoughCable) -> float:
 
 def lies_on(found: RoughCable, paths: list[Array]) -> bool:
     """True if most of the cable found lies within half a width of one of the paths (px)."""
-    first, last = found.visible
-    body = found.path_px[first : last + 1]
-    return any(median(cKDTree(path).query(body)[0]) < found.half_width_px for path in paths)
+    return any(median(cKDTree(path).query(found.seen_px)[0]) < found.half_width_px for path in paths)
 
 
 def _wanted(standout: Standout, cable: Cable) -> Wanted:

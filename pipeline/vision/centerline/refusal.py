@@ -15,7 +15,7 @@ from pipeline.messages import Message
 from pipeline.records import Array, Finding, Rejected, doubtful
 from pipeline.vision.centerline.curve_fit import CurveFit
 from pipeline.vision.centerline.midline import Sections
-from pipeline.vision.evidence import Evidence, unlike_a_cable, weigh
+from pipeline.vision.evidence import unlike_a_cable, weigh
 from pipeline.vision.median import median, scatter
 from pipeline.vision.rough import WIDTH_OFF, RoughCable
 from pipeline.vision.scale.plane import ChordFrame
@@ -28,12 +28,6 @@ _AXIS_DISTANCE_RADII = 0.25
 """Of the radius; a centerline that misses a bearing axis by more is worth a warning: over 100 rendered rigs right ones
 missed by 0.06 at most.
 """
-
-
-def evidence_of(rough: RoughCable, sections: Sections, *, known: bool = False) -> Evidence:
-    """How much what was measured looks like a cable."""
-    line, std = _middle_across(sections), 2.0 * median(sections.std)
-    return weigh(rough.closeup, *line, sections.width, std=std, share=sections.share, known=known)
 
 
 def _middle_across(sections: Sections) -> tuple[Array, Array]:
@@ -51,7 +45,8 @@ def refusal(
     diameter: float | None,
 ) -> Rejected | None:
     """Why a fitted curve is not the cable's; ``width`` (n,) m of the cable on the sections, ``diameter`` m if known."""
-    evidence = evidence_of(rough, sections, known=diameter is not None)
+    line, std, share = _middle_across(sections), 2.0 * median(sections.std), sections.share
+    evidence = weigh(rough.closeup, *line, sections.width, std=std, share=share, known=diameter is not None)
     middle = middle_width(width)[0]
     scale = middle / median(sections.width)
     whole = scale * sections.caliper

@@ -108,13 +108,13 @@ def smooth_path(path: Array, sigma: float) -> Array:
     return np.asarray(gaussian_filter1d(padded, sigma, axis=0)[pad : pad + len(even)])
 
 
-def path_normals(path: Array) -> tuple[Array, Array]:
-    """Unit tangents and normals ``(k, 2)`` of a path."""
+def path_normals(path: Array) -> Array:
+    """Unit normals ``(k, 2)`` of a path."""
     tangent = np.empty_like(path)
     tangent[1:-1] = 0.5 * (path[2:] - path[:-2])
     tangent[[0, -1]] = path[[1, -1]] - path[[0, -2]]
     tangent /= np.hypot(*tangent.T)[:, None] + 1e-12
-    return tangent, np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    return np.column_stack([-tangent[:, 1], tangent[:, 0]])
 
 
 def cut_across(
@@ -134,7 +134,7 @@ def cut_across(
     of edges one width apart gives middle and width of each section (`find_flanks`).
     """
     path = smooth_path(path, _SMOOTHING_WIDTHS * width)
-    _, normal = path_normals(path)
+    normal = path_normals(path)
     offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
     straight = straightened(standout.residual, path, normal, offsets)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
@@ -166,7 +166,7 @@ def crossed_at(standout: Standout, cut: CrossCut) -> tuple[float, float] | None:
     """
     width, each = cut.usual_width, max(1, round(0.25 * cut.usual_width))
     offsets = np.linspace(-_ARM_WIDTHS, _ARM_WIDTHS, 59)
-    straight = straightened(standout.residual, cut.path, path_normals(cut.path)[1], width * offsets)
+    straight = straightened(standout.residual, cut.path, path_normals(cut.path), width * offsets)
     grey = straight @ cut.weights.astype(np.float32)
     count = len(grey) // each
     if count <= 24:
