@@ -89,8 +89,8 @@ class Search:
             # Without a scale the travel in px is unknown: the user's axes hold for the first photo only.
             given = rig.bearings_px if travel == 0.0 and not covered else None
             widths = None if rig.marker_diameter_m is None else rig.marker_diameter_m / specimen.diameter_m
-            cable = Cable(bearings=BearingHints(cover_widths=widths, given_px=given))
-            cable = replace(cable, slenderness=specimen.length_m / specimen.diameter_m)
+            hints = BearingHints(cover_widths=widths, given_px=given)
+            cable = Cable(bearings=hints, slenderness=specimen.length_m / specimen.diameter_m)
         else:
             scale, given = self.calibration.scale.px_per_m, None
             if rig.bearings_px is not None and not covered:

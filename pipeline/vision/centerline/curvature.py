@@ -196,9 +196,13 @@ class PlaneCurve:
 
     def moved(self, step: Array) -> PlaneCurve:
         """The curve after a change ``(J + 2,)`` of q."""
-        at = self.angle
-        point = self.point + step[0] * np.array([-np.sin(at), np.cos(at)])
-        return PlaneCurve(self.frame, self.coefficients + step[2:], point, float(at + step[1]))
+        point = self.point + step[0] * np.array([-np.sin(self.angle), np.cos(self.angle)])
+        return PlaneCurve(self.frame, self.coefficients + step[2:], point, float(self.angle + step[1]))
+
+
+def normals(angle: Array) -> Array:
+    """Unit normals ``(n, 2)`` of tangents at some angles ``(n,)``."""
+    return np.column_stack([-np.sin(angle), np.cos(angle)])
 
 
 def _integrate(values: Array, grid: Array, anchor: int) -> Array:

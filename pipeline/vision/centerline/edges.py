@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.records import Array
-from pipeline.vision.centerline.curvature import PlaneCurve
+from pipeline.vision.centerline.curvature import PlaneCurve, normals
 from pipeline.vision.centerline.edge_profile import Pixels
 from pipeline.vision.median import median, medians, scatter
 from pipeline.vision.photo import Closeup, straightened
@@ -38,11 +38,6 @@ false edge (highlight, text) is mostly farther.
 """
 
 _TOGETHER = 2.0  # scatter of half the width over that of the middle; edges that err each by itself have 1
-
-
-def normals(angle: Array) -> Array:
-    """Unit normals ``(n, 2)``: direction of t."""
-    return np.column_stack([-np.sin(angle), np.cos(angle)])
 
 
 def in_picture(closeup: Closeup, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:

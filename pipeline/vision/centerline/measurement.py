@@ -24,17 +24,12 @@ from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
+from pipeline.vision.centerline.curvature import normals
 from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_errors, std_along
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
-from pipeline.vision.centerline.refusal import (
-    beside_axis,
-    feet_of_axes,
-    middle_width,
-    refusal,
-    refusal_of_band,
-)
+from pipeline.vision.centerline.refusal import beside_axis, feet_of_axes, middle_width, refusal, refusal_of_band
 from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
@@ -98,8 +93,7 @@ class Followed:
 
     def without(self, wiggle: Array, *, spare: float, lay_std: float) -> Followed:
         """The cable fitted anew, its sections moved back along their normals by ``wiggle`` (n,) m; see `Wiggle`."""
-        theta = self.fit.curve.at(self.fit.s)[1]
-        moved = wiggle[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
+        moved = wiggle[:, None] * normals(self.fit.curve.at(self.fit.s)[1])
         fit = _fit(self.sections, self.chord, self.width, moved=moved)
         noise = np.sqrt(spare)
         fit = replace(fit, smooth=replace(fit.smooth, root=noise * fit.smooth.root, sigma=noise * fit.smooth.sigma))
@@ -108,9 +102,9 @@ class Followed:
 
     def loosened(self, left: float, right: float) -> Followed:
         """The cable with axes whose standard deviations (px) are so large at least."""
-        axes = ((self.rough.left, left), (self.rough.right, right))
-        wider = [replace(axis, std_px=max(axis.std_px, std)) for axis, std in axes]
-        rough = replace(self.rough, left=wider[0], right=wider[1])
+        one, other = self.rough.axes
+        one, other = replace(one, std_px=max(one.std_px, left)), replace(other, std_px=max(other.std_px, right))
+        rough = replace(self.rough, left=one, right=other)
         return replace(self, rough=rough, chord=chord_frame(rough, self.chord.plane, self.chord.axis_parallax_std))
 
     @property
@@ -180,11 +174,9 @@ def _doubted(cable: Followed) -> Followed:
         return cable
     expected = np.diag(sight.covariance + told_alone(sight).covariance)
     beyond = np.sqrt(np.maximum(sight.miss**2 - expected, 0.0)) / median(cable.width / cable.sections.width)
-    pairs = zip(cable.rough.axes, beyond, strict=True)
-    left, right = (float(off) if axis.kind == "cover" and not axis.sure else 0.0 for axis, off in pairs)
-    return cable.loosened(
-        float(np.hypot(cable.rough.left.std_px, left)), float(np.hypot(cable.rough.right.std_px, right))
-    )
+    doubted = [axis.kind == "cover" and not axis.sure for axis in cable.rough.axes]
+    left, right = np.hypot([axis.std_px for axis in cable.rough.axes], np.where(doubted, beyond, 0.0)).tolist()
+    return cable.loosened(left, right)
 
 
 def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
@@ -205,10 +197,10 @@ def _fit(sections: Sections, chord: ChordFrame, width: Array, *, moved: Array | 
 
 def waves_of(cables: Sequence[Followed | Rejected]) -> Waves:
     """The waves that ground and camera make in the midlines of all photos of a series."""
-    halves = [cable.half_widths() for cable in cables if isinstance(cable, Followed)]
-    scales = [median(cable.width / cable.sections.width) for cable in cables if isinstance(cable, Followed)]
-    lay = max((cable.lay_std for cable in cables if isinstance(cable, Followed)), default=0.0)
-    return edge_waves(halves, metres_per_px=max(scales, default=0.0), lay=lay)
+    followed = [cable for cable in cables if isinstance(cable, Followed)]
+    metres = max((median(cable.width / cable.sections.width) for cable in followed), default=0.0)
+    lay = max((cable.lay_std for cable in followed), default=0.0)
+    return edge_waves([cable.half_widths() for cable in followed], metres_per_px=metres, lay=lay)
 
 
 def centerline_of(

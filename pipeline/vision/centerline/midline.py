@@ -35,9 +35,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_opening, maximum_filter1d, median_filter
 
 from pipeline.records import Array
-from pipeline.vision.centerline.curvature import PlaneCurve
+from pipeline.vision.centerline.curvature import PlaneCurve, normals
 from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles, in_one_light
-from pipeline.vision.centerline.edges import Found, edge_pixels, normals
+from pipeline.vision.centerline.edges import Found, edge_pixels
 from pipeline.vision.median import MAD_TO_STD, median, medians, quantile, scatter
 from pipeline.vision.photo import Closeup
 

@@ -6,15 +6,9 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array, Rejected
-from pipeline.vision.centerline.curvature import Frame, PlaneCurve, make_frame
+from pipeline.vision.centerline.curvature import Frame, PlaneCurve, make_frame, normals
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
-from pipeline.vision.centerline.edges import (
-    SEARCH_RADII,
-    Found,
-    in_picture,
-    normals,
-    search_edges,
-)
+from pipeline.vision.centerline.edges import SEARCH_RADII, Found, in_picture, search_edges
 from pipeline.vision.centerline.midline import (
     EDGE_WINDOW_BLURS,
     LEAST_SECTIONS,
