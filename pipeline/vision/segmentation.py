@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array, PhotoHints, Rejected, doubtful
-from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
+from pipeline.vision.by_hand import reading_along, with_hints
 from pipeline.vision.evidence import unlike_a_cable
 from pipeline.vision.judgement import Cable, judge_strip, refused, refused_at
 from pipeline.vision.median import median
@@ -94,7 +94,8 @@ def _find_near(photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCabl
 def _along_clicks(photo: Photo, cable: Cable) -> RoughCable | Rejected:
     """The cable along a person's clicks, of the width that has the most evidence."""
     judged = []
-    for width in widths_tried(cable):
+    # an edge is sought as far as a third beside its place
+    for width in np.geomspace(4.0, 80.0, 10).tolist() if cable.diameter_px is None else [cable.diameter_px]:
         standout = stand_out(photo, choose_reduction(photo.size, width))
         reading = reading_along(standout, cable.path_px, width)
         outcome = judge_strip(photo, standout, reading, reading.strips[0], cable)

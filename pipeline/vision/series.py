@@ -189,7 +189,7 @@ def _tied(shots: list[Shot], cables: Sequence[Followed | Rejected], settings: Vi
     ]
 
 
-def _doubted(line: Centerline | Rejected, calibration: Calibration) -> Centerline | Rejected:
+def _doubted(line: Line, calibration: Calibration) -> Line:
     """Add what its plane leaves open to the band of a centerline; refuse it where that is not finite."""
     if isinstance(line, Rejected):
         return line
@@ -204,9 +204,9 @@ def _name_sides(
 
     Returns whether all cables are to be named from their other ends.
     """
-    axes = np.array([[cable.left.center_px, cable.right.center_px] for cable in found])
     if len(found) < 2:
         return False, ()
+    axes = np.array([[axis.center_px for axis in cable.axes] for cable in found])
     steps = np.hypot(*np.ptp(axes, axis=0).T)  # (2,) px: how far the left and the right axis went
     least = _MIN_TRAVEL_M * float(calibration.scale.px_per_m)
     moving = "left" if steps[0] > steps[1] else "right"
@@ -234,12 +234,8 @@ def _reversed(found: RoughCable | Rejected) -> RoughCable | Rejected:
 
 
 def _without_hidden_ends(
-    found: RoughCable | Rejected,
-    line: Centerline | Rejected,
-    specimen: Specimen,
-    calibration: Calibration,
-    settings: VisionSettings,
-) -> Centerline | Rejected:
+    found: RoughCable | Rejected, line: Line, specimen: Specimen, calibration: Calibration, settings: VisionSettings
+) -> Line:
     """Refuse a line from visible end to visible end that is not as long as the cable: bearings hide its ends."""
     if isinstance(found, Rejected) or isinstance(line, Rejected) or found.left.kind not in ("end", "clamp"):
         return line
@@ -251,9 +247,7 @@ def _without_hidden_ends(
     return Rejected(line.image, said, line.preview)
 
 
-def _check_lengths(
-    specimen: Specimen, lines: tuple[Centerline | Rejected, ...], settings: SeriesSettings
-) -> tuple[Finding, ...]:
+def _check_lengths(specimen: Specimen, lines: Sequence[Line], settings: SeriesSettings) -> tuple[Finding, ...]:
     """The cable's length does not change: the best free check of scale, bearings and tracing together."""
     traced = [line for line in lines if isinstance(line, Centerline)]
     if not traced:

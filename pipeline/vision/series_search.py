@@ -30,6 +30,11 @@ class Shot:
     preview: Preview | None
     size: tuple[int, int] | None = None
 
+    @property
+    def sides(self) -> tuple[int, ...] | None:
+        """Short and long side in px: the same for a photo turned by a quarter."""
+        return None if self.size is None else tuple(sorted(self.size))
+
 
 @dataclass(frozen=True)
 class Search:
