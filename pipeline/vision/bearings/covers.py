@@ -24,14 +24,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.vision.bearings.cut import cover_by_cut
-from pipeline.vision.bearings.rim import (
-    MIN_RIM,
-    RADIUS_STD,
-    SURE_RIM,
-    Circle,
-    Radius,
-    fit_circle,
-)
+from pipeline.vision.bearings.rim import MIN_RIM, RADIUS_STD, SURE_RIM, Circle, Radius, fit_circle
 from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks, with_rings
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
@@ -56,7 +49,6 @@ _REACH_RADII = 4.1
 it, are as long as a diameter.
 """
 _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
-_CANDIDATES = 3  # best voted centres that are fitted; the rim decides among them
 
 PixelPair = tuple[tuple[float, float], tuple[float, float]]
 
@@ -134,7 +126,7 @@ def _best_circle(
 ) -> Circle | None:
     """The circle with the most of its rim seen among the centres of the window with the most votes."""
     best: Circle | None = None
-    for _ in range(_CANDIDATES):
+    for _ in range(3):  # the rim decides among the best voted
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
         circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius, softness=softness)
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):

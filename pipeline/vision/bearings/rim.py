@@ -35,8 +35,6 @@ _BEVEL_SPREAD_SHARE = 0.22
 """Of the rim's blur; standard deviation of what a bevel moves the rim all round: half at most on 18 rendered covers."""
 _RIM_TOLERANCE = 0.015  # radii; an edge so near to the circle belongs to the rim, chance edges spread ten times wider
 _LEAST_TOLERANCE_PX, _MOST_TOLERANCE = 0.75, 0.1  # px, as pixels allow; radii of a small cover, near which chance lies
-_POOLED_RAYS = 1.5  # rays; standard deviation of the pooling along the rim
-_DIRECTIONS = 160  # rays of the circle fit at most; more share their pixels and tell little new
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ def fit_circle(
     beside it, the next ring would pass for one; and nobody knows its radius, so that proves nothing.
     """
     radius = expected.px
-    count = int(np.clip(2.0 * np.pi * radius, 90, _DIRECTIONS))
+    count = int(np.clip(2.0 * np.pi * radius, 90, 160))  # more rays share their pixels and tell little new
     angle = np.arange(count) * (2.0 * np.pi / count)
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
     span = max(4.0, SEARCH_RADII * radius)
@@ -155,7 +153,7 @@ def _radial_slopes(
     # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
     pooled = gaussian_filter(
         np.gradient(profile, 0.5, axis=1),
-        (_POOLED_RAYS * softness, 2.0 * softness, 0.0),
+        (1.5 * softness, 2.0 * softness, 0.0),
         mode=("wrap", "reflect", "wrap"),
     )
     slope: NDArray[np.float32] = np.asarray(pooled)

@@ -35,25 +35,16 @@ _KNOT_SPACING_DIAMETERS = 1.5  # diameters; a cable cannot bend more sharply tha
 _MIN_INTERVALS = 16  # knot intervals; fewer bias kappa at mid-span above 0.05 %
 _PATH_KNOT_DIAMETERS = 5.0  # diameters; knots of the path that the edges are sought along
 _MOST_INTERVALS = 120  # knot intervals; bounds the time, and of more of them a gap among the points makes a bad start
-_SEARCHES = 3  # at most, each along what the one before found: a path half a width astray is back after two
 _LONGEST_CORRELATION_DIAMETERS = 2.0
 """Diameters; bound of the errors' correlation length, longer ones cannot be told from a bend."""
 
 
-def fit_along(
-    points: Array,
-    std: Array,
-    *,
-    s: Array,
-    length: float,
-    diameter: float,
-) -> CurveFit:
+def fit_along(points: Array, std: Array, *, s: Array, length: float, diameter: float) -> CurveFit:
     """Curve from axis to axis through points along it: the penalty decides, not the knots.
 
     Parameters
     ----------
-    points : (n, 2)
-    std : (n,)
+    points, std : (n, 2), (n,)
     s : (n,)
         About the arc lengths of the points from the left axis.
     length, diameter : float
@@ -95,7 +86,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     if span is None:
         return _lost(rough, 0.0)
     tolerance = WIDTH_OFF * (1.0 if known else 2.0)  # a mask's width is known half as well
-    for _ in range(_SEARCHES):
+    for _ in range(3):  # a path half a width astray is back after two
         found = search_edges(closeup, path, span=span, half_width=half_width, tolerance=tolerance)
         width = found.edges[:, 1] - found.edges[:, 0]
         middle = median(width[found.usable]) if found.usable.any() else np.nan

@@ -40,7 +40,6 @@ _PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mas
 _PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer
 _PAIR_WANDER_COST = 0.5  # usual edges for each column moved; a mask wanders slowly, a jump to a shadow's edge must pay
 _PAIR_WIDTH_RANGE = (0.45, 1.6)  # ratios to the width that are tried: half a cable along a highlight, and a shadow's
-_PAIR_WIDTHS = 26  # widths tried, 5 % apart; the edges are then sought in 15 %
 _PAIR_WIDTH_STD = 0.25  # logarithm; how far a given diameter may be off: scales and sheaths are
 _PAIR_WIDTH_SHARE = 0.9  # ratio to the best pair's score from which a wider pair is preferred
 _EDGE_REACH_WIDTHS = 0.1  # widths; an edge is sought so near to the pair's place; glare is farther
@@ -335,7 +334,7 @@ def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, 
     Of an unknown width it is the largest of nearly the best: a highlight splits a cable, nothing doubles
     it.
     """
-    tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, _PAIR_WIDTHS)
+    tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, 26)  # 5 % apart; the edges are then sought in 15 %
     rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
     totals = _reached(_pair_score(rise, fall, near, tried), _PAIR_WANDER_COST)[-1].max(axis=1) / len(rise)
     if known:
