@@ -77,10 +77,6 @@ def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) 
 
     Parameters
     ----------
-    path : Path
-        Any file; names outside ASCII are read as well.
-    settings : PhotoSettings
-        Size limits.
     name : str, optional
         Name in reports; the file's name if not given.
 

@@ -147,12 +147,6 @@ def with_fixed_cover(
     return settled
 
 
-_CROPPED_LENGTH = 0.03
-"""Relative; of the cable's length in px on a photo of another size: it is found within a third of that, and nobody
-scales a photo by less.
-"""
-
-
 def of_one_size(shots: list[Shot]) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Refuse photos of another size than most that were not merely cropped, and those turned by a quarter.
 
@@ -184,7 +178,8 @@ def of_one_size(shots: list[Shot]) -> tuple[list[Shot], tuple[Finding, ...]]:
         name = shot.found.image
         both = {"size": f"{shot.size[0]} x {shot.size[1]} px", "most": f"{usual[1]} x {usual[0]} px"}
         ratio = shot.found.length_px / float(np.median(lengths)) if isinstance(shot.found, RoughCable) else np.nan
-        if abs(ratio - 1.0) <= _CROPPED_LENGTH:
+        # a length is found within a third of that, and nobody scales a photo by less
+        if abs(ratio - 1.0) <= 0.03:
             findings.append(inferred("photo/size.cropped", image=name, **both))
         else:
             settled[k] = replace(shot, found=Rejected(name, Message("photo/size", **both)))

@@ -137,13 +137,11 @@ def edge_pixels(
     where, angle = curve.at(all_s)
     across = normals(angle)
     out, expected = np.arange(-np.ceil(window[0]), np.ceil(window[1]) + 1.0), outline(all_s)[..., None]
-    t = np.array([-1.0, 1.0])[:, None, None] * (expected + out)  # side, row, pixel
+    side = np.array([-1.0, 1.0])[:, None, None]
+    t = side * (expected + out)  # side, row, pixel
     u = np.rint(where[:, :1] + across[:, :1] * t)
     v = np.rint(where[:, 1:] + across[:, 1:] * t)
-    offset = (
-        np.array([-1.0, 1.0])[:, None, None] * ((u - where[:, :1]) * across[:, :1] + (v - where[:, 1:]) * across[:, 1:])
-        - expected
-    )
+    offset = side * ((u - where[:, :1]) * across[:, :1] + (v - where[:, 1:]) * across[:, 1:]) - expected
     height, width = closeup.grey.shape
     column = np.clip(u.astype(np.int64) - closeup.origin_px[0], 0, width - 1)
     row = np.clip(v.astype(np.int64) - closeup.origin_px[1], 0, height - 1)

@@ -109,7 +109,7 @@ def seen_waves(photos: Sequence[HalfWidths]) -> Waves:
     coarsest = _SLOW_WIDTH_ORDER + 1
     found = np.array([_components(photo)[:, coarsest:] for photo in told])  # (photos, 2, k)
     counts = np.array([len(photo.s) for photo in told], float)
-    # of the waves' variances: nothing, then all up to what would be the whole of the widths' own
+    # of the waves' variances: nothing, then all up to what would be the whole of the widths' own, by factors of 1.27
     largest = float(np.mean(np.sum(found[:, 0] ** 2, axis=1) / counts))
     variances = np.r_[0.0, largest * np.geomspace(1e-3, 10.0, 40)]
     value = np.array([_surprise(found, counts, share, variances) for share in _shares()[:, coarsest:]])

@@ -41,13 +41,7 @@ LIGHT_LENGTH_SHARE = 0.35
 """Of the seen length; correlation length of the light's error: it follows the cable's direction, which turns once from
 end to end; over 135 scenes 0.35 was likelier than 0.25 and 0.5.
 """
-_HIDDEN_WIDTHS = 0.5  # a stretch is hidden where no section was measured so near: letters and specks are shorter
-_CORNER_WIDTHS = 0.5  # widths; so far aside of the cable a corner of its mask lies at most
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
-_LEAST_BALANCE = 0.8
-"""Of both edges in a section (1: they count alike) for its width to tell how long errors last: one edge then has four
-times the other's variance.
-"""
 
 
 @dataclass(frozen=True)
@@ -85,7 +79,8 @@ class Followed:
 
     def half_widths(self) -> HalfWidths:
         """Half the width along the sections that live on both edges: errors of the midline without its bend."""
-        used = (self.fit.weight > 0.0) & (self.sections.balance > _LEAST_BALANCE)
+        # at a balance of 0.8 one edge has four times the other's variance
+        used = (self.fit.weight > 0.0) & (self.sections.balance > 0.8)
         half = 0.5 * (self.sections.balance * (self.width - median(self.width)))[used]
         if self.sections.waves:
             half *= min(1.0, scatter(self.fit.residual[used], 0.0) / scatter(half, 0.0))
@@ -150,7 +145,8 @@ def follow_cable(
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
     fit = _fit(sections, chord, width)
     feet, misses = feet_of_axes(fit, chord)
-    if not chord.marked and misses.max() < _CORNER_WIDTHS * middle_width(width)[0]:
+    # a corner of its mask lies half a width aside of the cable at most
+    if not chord.marked and misses.max() < 0.5 * middle_width(width)[0]:
         rough = _with_ends(rough, chord.to_pixels(fit.curve.at(feet)[0]))
         chord = chord_frame(rough, plane, axis_parallax_std)
         fit = _fit(sections, chord, width)
@@ -288,8 +284,8 @@ def _shape(
     where, theta = fit.curve.at(s)
     normal, turn, bend = fit.curve.bases(s)
     used = fit.weight > 0.0
-    # s is seen where a section was measured so near, or their usual distance
-    reach = max(median(np.diff(fit.s)), _HIDDEN_WIDTHS * width)
+    # s is seen where a section was measured so near, or their usual distance: letters and specks are shorter
+    reach = max(median(np.diff(fit.s)), 0.5 * width)
     return MeasuredShape(
         s=s - s[0],
         x=where[:, 0],

@@ -243,9 +243,8 @@ def _consistent(
     for side, other in ((0, 1), (1, 0)):
         lost = ~good[:, side] & good[:, other]
         out[lost, side] = local[lost, side] + together * (filled - local)[lost, other]
-        spread[lost, side] = (
-            2.0 * std[lost, other]
-        )  # the same error again, with the other sign: midpoint moves by all of it
+        # the same error again, with the other sign: midpoint moves by all of it
+        spread[lost, side] = 2.0 * std[lost, other]
     if together > 0.0:  # where wires cross, the one in front may stand out more, but the outline has a corner
         spread = np.maximum(spread, medians(spread, axis=0))
     return out, spread, good

@@ -116,7 +116,7 @@ class _Diagonal:
         return np.asarray(self.gamma2 + np.multiply.outer(weight, 1.0 - self.gamma2))
 
     def weights(self) -> Array:
-        """Weights (w,) of the penalty over all that can matter, a factor of about two apart."""
+        """Weights (w,) of the penalty over all decades that can matter, by factors of about two."""
         ratio = np.sort(np.maximum(self.gamma2, _FLOOR) / np.maximum(1.0 - self.gamma2, _FLOOR))[: -self.null]
         return np.exp(np.linspace(np.log(0.1 * ratio[0]), np.log(1e3 * ratio[-1]), 97))
 

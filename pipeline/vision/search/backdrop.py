@@ -14,6 +14,7 @@ Units: grey values are fractions of full range; pixels of the reduced photo are 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -195,6 +196,11 @@ def _cable_and_shadow(standout: Standout) -> tuple[NDArray[np.bool_], NDArray[np
     return middle & ~shadow, middle & shadow
 
 
+def bands(photo: Photo) -> Iterator[slice]:
+    """The rows of a photo, some at a time."""
+    return (slice(first, first + ROWS) for first in range(0, photo.size[1], ROWS))
+
+
 def _along(photo: Photo, core: Array, ground: Array) -> Photo:
     """Grey values by the discriminant of colours ``(n, c)`` less the ground's, of a covariance ``(c, c)``."""
     step = np.median(core, axis=0)
@@ -204,6 +210,6 @@ def _along(photo: Photo, core: Array, ground: Array) -> Photo:
     darkest = float(np.minimum(weights, 0.0).sum())
     scaled = (65535.0 / photo.full_scale * weights).astype(np.float32)[None]
     grey = np.empty(photo.pixels.shape[:2], np.uint16)
-    for rows in (slice(first, first + ROWS) for first in range(0, len(grey), ROWS)):
+    for rows in bands(photo):
         grey[rows] = np.rint(cv2.transform(photo.pixels[rows].astype(np.float32), scaled) - 65535.0 * darkest)
     return Photo(photo.name, grey, 16, photo)
