@@ -5,12 +5,13 @@ A room gets its own part only. ``Settings()`` holds the defaults; unknown keys a
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pipeline.settings.batch import BatchSettings
 from pipeline.settings.diagnosis import DiagnosisSettings
 from pipeline.settings.identify import IdentifySettings
 from pipeline.settings.intake import IntakeSettings
+from pipeline.settings.part import SettingsPart
 from pipeline.settings.report import ReportSettings
 from pipeline.settings.vision import VisionSettings
 
@@ -25,10 +26,8 @@ __all__ = [
 ]
 
 
-class Settings(BaseModel):
+class Settings(SettingsPart):
     """All settings, by room."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     intake: IntakeSettings = Field(default_factory=IntakeSettings)
     vision: VisionSettings = Field(default_factory=VisionSettings)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from pipeline.settings.part import SettingsPart
 
 
-class BatchSettings(BaseModel):
+class BatchSettings(SettingsPart):
     """Limits of ``batch``; none of them changes a result."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     workers: int = Field(0, ge=0, description="processes on this machine; 0: one a core, each with one thread")
     in_process: bool = Field(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from pipeline.settings.part import SettingsPart
 
 
-class DiagnosisSettings(BaseModel):
+class DiagnosisSettings(SettingsPart):
     """Thresholds of ``diagnosis``."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     # detection
     false_alarm: float = Field(0.01, description="probability of naming anything on a specimen without effect")

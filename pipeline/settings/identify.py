@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from pipeline.settings.part import SettingsPart
 
 
-class IdentifySettings(BaseModel):
+class IdentifySettings(SettingsPart):
     """How well the rig is known: what ``identify`` weighs forces, displacements and bearing axes by."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     length_std_relative: float = Field(
         5e-4, gt=0, description="relative; a steel rule read to 0.1 mm on a cable of 200 mm"

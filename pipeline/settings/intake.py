@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from pipeline.settings.part import SettingsPart
 
 
-class IntakeSettings(BaseModel):
+class IntakeSettings(SettingsPart):
     """Limits of ``intake``, and what it takes for usual."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     # Untrusted input
     allow_outside: bool = Field(

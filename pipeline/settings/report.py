@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from pipeline.settings.part import SettingsPart
 
 
-class ReportSettings(BaseModel):
+class ReportSettings(SettingsPart):
     """What the report shows and how."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     language: Literal["en", "de"] = Field("en", description="language and number format of report and index")
     band_coverage: float = Field(

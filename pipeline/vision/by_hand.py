@@ -23,19 +23,9 @@ from pipeline.vision.search.backdrop import Standout
 from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.strips import Strip, drawn_path
 
-_WIDTHS = np.geomspace(4.0, 80.0, 10)
-"""Px; tried along clicks where the diameter is unknown: an edge is sought as far as a third beside its place."""
-
 
 def with_hints(photo: Photo, cable: Cable, hints: PhotoHints) -> tuple[Photo, Cable]:
-    """The photo and what is known of its cable, by what a person says.
-
-    Parameters
-    ----------
-    photo : Photo
-    cable : Cable
-    hints : PhotoHints
-    """
+    """The photo and what is known of its cable, by what a person says."""
     for polygon in hints.exclude_px:
         photo = _painted(photo, np.array(polygon))
     ends = hints.ends_px
@@ -64,11 +54,6 @@ def _painted(photo: Photo, polygon: Array) -> Photo:
     pixels = photo.pixels.copy()
     pixels[inside > 0] = np.median(pixels[around], axis=0).astype(pixels.dtype)
     return replace(photo, pixels=pixels)
-
-
-def widths_tried(cable: Cable) -> list[float]:
-    """Widths (px) a cable along clicks may have."""
-    return _WIDTHS.tolist() if cable.diameter_px is None else [cable.diameter_px]
 
 
 def reading_along(standout: Standout, path_px: tuple[tuple[float, float], ...], width_px: float) -> Reading:

@@ -22,7 +22,6 @@ from pipeline.vision.median import SURE_SIGMAS, median, scatter
 from pipeline.vision.photo import Closeup, straightened
 from pipeline.vision.polyline import step_lengths
 
-_PER_WIDTH = 10  # columns of the straightened picture a width, one a px at least
 _NULL = (1.15, 1.4, 1.65)  # widths from the midline where there is no edge; the window along a cable reaches to 2.25
 _FIRM = 4.0  # standard deviations; of the median block of a strip that leaves no doubt
 _LEAST_LIKENESS = 0.45  # cables on webcam photos reach 0.6 and more; with paper on a third of a cable 0.4 is left
@@ -30,8 +29,6 @@ _STEADY = 0.1  # of what camera and edges explain: a width as constant as that i
 _LEVEL = 1.0 / 512.0  # of full range; half a level of 8 bits: no photo is calmer than its rounding
 _CALM_PX, _CALM = 0.5, 0.04  # width's scatter that every camera makes: px of halo, JPEG and grid; share of the width
 _ALONG = 5  # sections pooled for the width's constancy, unless its waves are longer
-_LEAST_WAVES = 6  # of a strip whose outline swells and narrows again and again: fewer may be anything
-_REPEATED = 0.5  # correlation of the width with itself one wave on: of any other widths it is less
 
 
 @dataclass(frozen=True)
@@ -130,7 +127,7 @@ def weigh(
     length = gap * (len(middle) - 1)
     if len(middle) < 4 * each:
         return Evidence(length)
-    spacing = max(1.0, width / _PER_WIDTH)
+    spacing = max(1.0, width / 10.0)
     columns = np.ceil(2.1 * width / spacing)
     offset = np.arange(-columns, columns + 1.0) * spacing
     picture = straightened(closeup.grey, middle - closeup.origin_px, across, offset)
@@ -141,11 +138,13 @@ def weigh(
     noise = float(np.hypot(scatter(ground - np.median(ground, axis=0), 0.0), _LEVEL))
     weaker = np.min(_steps(blocks, offset, np.array([-0.5, 0.5]) * width, reach), axis=1) / noise
     edges = median(weaker)
+    along = _wave(widths)
+    calm = np.convolve(widths, np.ones(along) / along, mode="valid") if len(widths) > along else widths
     return Evidence(
         length=length,
         seen=float(np.mean(weaker > (min(SURE_SIGMAS, 0.5 * edges) if known else SURE_SIGMAS))) * share,
         edges=edges,
-        unsteady=_unsteady(widths, width, std),
+        unsteady=scatter(calm) / max(_CALM_PX, _CALM * width, 1.5 * std),
         crossed=crossed,
     )
 
@@ -159,21 +158,18 @@ def _steps(blocks: Array, offset: Array, places: Array, reach: int) -> Array:
     return np.asarray((right - left) * np.sign(places))
 
 
-def _unsteady(widths: Array, width: float, std: float) -> float:
-    along = _wave(widths)
-    calm = np.convolve(widths, np.ones(along) / along, mode="valid") if len(widths) > along else widths
-    return scatter(calm) / max(_CALM_PX, _CALM * width, 1.5 * std)
-
-
 def _wave(widths: Array) -> int:
-    """Sections over which an outline's waves average: those of a wave that repeats itself all along, as of a twist."""
+    """Sections over which an outline's waves average: those of a wave that repeats itself all along, as of a twist.
+
+    That is six times or more, with a correlation of one half: fewer may be anything, and other widths have less.
+    """
     off = widths - median(widths)
-    alike = np.correlate(off, off, mode="full")[len(off) - 1 :][: len(off) // _LEAST_WAVES]
+    alike = np.correlate(off, off, mode="full")[len(off) - 1 :][: len(off) // 6]
     if not (alike < 0.0).any():
         return _ALONG
     down = int(np.argmax(alike < 0.0))
     length = down + int(np.argmax(alike[down:]))
-    return max(_ALONG, length) if alike[length] > _REPEATED * alike[0] else _ALONG
+    return max(_ALONG, length) if alike[length] > 0.5 * alike[0] else _ALONG
 
 
 def unlike_a_cable(evidence: Evidence) -> Message:

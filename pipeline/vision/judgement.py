@@ -20,11 +20,7 @@ from pipeline.vision.photo import Photo
 from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.backdrop import Standout
-from pipeline.vision.search.beyond import (
-    follow,
-    followed_in,
-    more_beyond,
-)
+from pipeline.vision.search.beyond import follow, followed_in, more_beyond
 from pipeline.vision.search.candidates import Reading
 from pipeline.vision.search.closeup import edge_spreads, take_closeup
 from pipeline.vision.search.crosscut import CrossCut, crossed_at, cut_across, path_normals
@@ -95,7 +91,8 @@ def judge_strip(
 
 
 def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cable: Cable) -> RoughCable | Rejected:
-    cut = cut_across(standout, strip.path, reading.width, known=cable.diameter_px is not None)
+    known = cable.diameter_px is not None
+    cut = cut_across(standout, strip.path, reading.width, known=known)
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
     crossed = None if cable.path_px else crossed_at(standout, cut)  # a person knows which arm it is
@@ -110,7 +107,7 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
     path = _up_to_axes(standout, strip.path, axes, reading.width)
     if path is None:
         return refused(photo, "photo/bearing.nothing")
-    cut = cut_across(standout, path, reading.width, known=cable.diameter_px is not None)
+    cut = cut_across(standout, path, reading.width, known=known)
     if not len(cut.seen_widths):
         return refused(photo, "photo/contrast.no-edges")
     refusal = _check_width(photo, cut, standout.reduction, cable)
@@ -130,13 +127,9 @@ def _judge(photo: Photo, standout: Standout, reading: Reading, strip: Strip, cab
         told = (*told, doubtful("photo/hidden-end.partial", u_px=more[0], v_px=more[1]))
     widths = cut.seen_widths * standout.reduction
     share = len(cut.seen_widths) / len(cut.width)
-    first, last = found.visible
-    path = found.path_px[first : last + 1]
     # a cell's edge is found to a fifth of it
-    std = 0.3 * standout.reduction
-    across = path_normals(path)[1]
-    known = cable.diameter_px is not None
-    evidence = weigh(found.closeup, path, across, widths, std=std, share=share, crossed=crossed, known=known)
+    std, across = 0.3 * standout.reduction, path_normals(found.seen_px)
+    evidence = weigh(found.closeup, found.seen_px, across, widths, std=std, share=share, crossed=crossed, known=known)
     return replace(found, goes_on=more is not None, evidence=evidence, findings=told)
 
 
@@ -164,7 +157,7 @@ def refused_at(photo: Photo, key: str, place: Sequence[float] | Array) -> Reject
 def _unsharp(photo: Photo, standout: Standout, cut: CrossCut) -> Rejected | None:
     """Say of a photo whose covers were not found that its edges are blurred, where they are."""
     width = cut.usual_width * standout.reduction
-    path, across = standout.to_pixels(cut.path), path_normals(cut.path)[1]
+    path, across = standout.to_pixels(cut.path), path_normals(cut.path)
     closeup = take_closeup(photo, path, width, cut.weights)
     # a shadow softens one edge, focus and motion both
     softest = float(edge_spreads(closeup.picture[..., 0], closeup.to_cells(path), across, width).min(axis=0).max())

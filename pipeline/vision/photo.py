@@ -21,7 +21,7 @@ from PIL import ImageOps
 
 from pipeline.messages import Message, by_system
 from pipeline.records import Rejected
-from pipeline.settings.vision.photo import PhotoSettings
+from pipeline.settings.vision import PhotoSettings
 from pipeline.vision.photo_file import BROKEN, is_sound, is_whole, opened, read_header
 
 Pixels = NDArray[np.uint8 | np.uint16]
@@ -77,10 +77,6 @@ def load_photo(path: Path, settings: PhotoSettings, *, name: str | None = None) 
 
     Parameters
     ----------
-    path : Path
-        Any file; names outside ASCII are read as well.
-    settings : PhotoSettings
-        Size limits.
     name : str, optional
         Name in reports; the file's name if not given.
 

@@ -11,7 +11,6 @@ import io
 import struct
 import warnings
 import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from PIL import ImageFile
@@ -91,18 +90,16 @@ def is_sound(data: bytes, kind: str) -> bool:
 
     The other kinds have no checksums, and their decoders no trust in lengths.
     """
-    return kind != "png" or all(_png_chunks(data))
-
-
-def _png_chunks(data: bytes) -> Iterator[bool]:
-    """Whether each chunk up to the last is sound: a length, four letters, contents and their checksum."""
+    if kind != "png":
+        return True
     view, place, name = memoryview(data), len(PNG_BEGIN), b""
-    while name != b"IEND":
+    while name != b"IEND":  # a chunk: length, four letters, contents and their checksum
         name = data[place + 4 : place + 8]
         end = place + 8 + int.from_bytes(data[place : place + 4], "big")
         if len(name) < 4 or end + 4 > len(data):
-            yield False
-            return
+            return False
         ancillary = bool(name[0] & 0x20)  # small first letter: a remark, no part of the picture
-        yield ancillary or zlib.crc32(view[place + 4 : end]) == int.from_bytes(data[end : end + 4], "big")
+        if not ancillary and zlib.crc32(view[place + 4 : end]) != int.from_bytes(data[end : end + 4], "big"):
+            return False
         place = end + 4
+    return True

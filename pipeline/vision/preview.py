@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array, Centerline, Preview
-from pipeline.settings.vision.photo import PreviewSettings
+from pipeline.settings.vision import PreviewSettings
 from pipeline.vision.median import quantile
 from pipeline.vision.photo import Photo, reduce_area, straightened
 from pipeline.vision.polyline import arc_lengths
@@ -22,7 +22,6 @@ from pipeline.vision.search.crosscut import path_normals
 
 # Okabe and Ito's orange and sky blue (blue, green, red): told apart by colour-blind readers and on dark and bright.
 _MIDDLE, _EDGE = (0, 159, 230), (233, 180, 86)
-_STRIP_WIDTHS = 1.0  # cable widths shown on each side of the middle of the strip
 _STRIP_HEIGHT_PX = 160  # px; a bend of a hundredth of the width is a pixel high
 
 
@@ -40,9 +39,8 @@ def with_strip(preview: Preview, line: Centerline, rough: RoughCable, settings: 
     s = arc_lengths(path)
     along = np.linspace(0.0, s[-1], settings.long_side_px)
     points = np.column_stack([np.interp(along, s, path[:, 0]), np.interp(along, s, path[:, 1])])
-    _, normal = path_normals(points)
-    normal *= -1.0 if line.mirrored else 1.0
-    half = _STRIP_WIDTHS * 2.0 * rough.half_width_px
+    normal = path_normals(points) * (-1.0 if line.mirrored else 1.0)
+    half = 2.0 * rough.half_width_px  # a width on each side of the middle
     across = np.linspace(-half, half, _STRIP_HEIGHT_PX)
     strip = straightened(rough.grey, points - rough.origin_px, normal, across)[..., 0].T
     picture = np.asarray(cv2.cvtColor(_stretched(strip, line, s, along), cv2.COLOR_GRAY2BGR), np.uint8)

@@ -67,7 +67,6 @@ class RoughCable:
     visible : (first, last)
         Indices into ``path_px``, both included: the part in which the cable is seen. Outside, the path runs straight to
         the bearing axis and carries no information.
-    left, right : Bearing
     half_width_px : px
         Half the width of the cable's mask, median along the cable.
     grey : (h, w) float32
@@ -80,7 +79,6 @@ class RoughCable:
         Median step between ground and cable, positive.
     weights : tuple of float
         Colour projection: weight of each channel as stored (one for grey photos).
-    findings : tuple of Finding
     goes_on : bool
         The cable seems to go on beyond an end of it.
     evidence : Evidence
@@ -109,6 +107,11 @@ class RoughCable:
     def axes(self) -> tuple[Bearing, Bearing]:
         """The left and the right bearing axis."""
         return self.left, self.right
+
+    @property
+    def seen_px(self) -> Array:
+        """The part of the path ``(m, 2)`` in which the cable is seen, px."""
+        return self.path_px[self.visible[0] : self.visible[1] + 1]
 
     @property
     def closeup(self) -> Closeup:

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.records import Array, PhotoHints, Rejected, doubtful
-from pipeline.vision.by_hand import reading_along, widths_tried, with_hints
+from pipeline.vision.by_hand import reading_along, with_hints
 from pipeline.vision.evidence import unlike_a_cable
 from pipeline.vision.judgement import Cable, judge_strip, refused, refused_at
 from pipeline.vision.median import median
@@ -54,17 +54,12 @@ def find_cable(
 
     Parameters
     ----------
-    photo : Photo
     cable : Cable, optional
         What is known of it.
     near : RoughCable, optional
         The cable on a neighbouring photo of the series: only its surroundings are searched first.
     hints : PhotoHints, optional
         What a person says about this photo.
-
-    Returns
-    -------
-    RoughCable or Rejected
     """
     cable = Cable() if cable is None else cable
     if hints is not None:
@@ -73,8 +68,8 @@ def find_cable(
     if cable.diameter_px is not None or cable.slenderness is None or _is_slender(found, cable.slenderness):
         return found
     # The two flanks of a round sheath, its highlight or the shadow beside it are strips as long as the cable is.
-    widths = [2.0 * near.half_width_px] if near is not None else _widths(photo, cable.slenderness)
-    for width in widths:
+    width = 2.0 * near.half_width_px if near is not None else _width_of_longest(photo, cable.slenderness)
+    if width is not None:
         again = _find_near(photo, replace(cable, diameter_px=width), near)
         if _is_slender(again, cable.slenderness):
             return again
@@ -99,7 +94,8 @@ def _find_near(photo: Photo, cable: Cable, near: RoughCable | None) -> RoughCabl
 def _along_clicks(photo: Photo, cable: Cable) -> RoughCable | Rejected:
     """The cable along a person's clicks, of the width that has the most evidence."""
     judged = []
-    for width in widths_tried(cable):
+    # an edge is sought as far as a third beside its place
+    for width in np.geomspace(4.0, 80.0, 10).tolist() if cable.diameter_px is None else [cable.diameter_px]:
         standout = stand_out(photo, choose_reduction(photo.size, width))
         reading = reading_along(standout, cable.path_px, width)
         outcome = judge_strip(photo, standout, reading, reading.strips[0], cable)
@@ -119,15 +115,15 @@ def _slenderness(found: RoughCable) -> float:
     return 0.5 * found.length_px / found.half_width_px
 
 
-def _widths(photo: Photo, slenderness: float) -> list[float]:
-    """Widths (px) the cable has by its stated slenderness if the longest strips seen are as long as it is."""
+def _width_of_longest(photo: Photo, slenderness: float) -> float | None:
+    """Width (px) the cable has by its stated slenderness if the longest strip seen is as long as it is."""
     standout = stand_out(photo, choose_reduction(photo.size, None))
     wanted = _wanted(standout, Cable())
     for readings in read_photo(standout, wanted):
         longest = max(reading.longest for reading in readings)
         if longest >= wanted.least_length:
-            return [longest * standout.reduction / slenderness]
-    return []
+            return longest * standout.reduction / slenderness
+    return None
 
 
 def _find_in(photo: Photo, cable: Cable, window: Window | None, near: RoughCable | None) -> RoughCable | Rejected:
@@ -290,9 +286,7 @@ def _length_beyond(path: Array, best: RoughCable) -> float:
 
 def lies_on(found: RoughCable, paths: list[Array]) -> bool:
     """True if most of the cable found lies within half a width of one of the paths (px)."""
-    first, last = found.visible
-    body = found.path_px[first : last + 1]
-    return any(median(cKDTree(path).query(body)[0]) < found.half_width_px for path in paths)
+    return any(median(cKDTree(path).query(found.seen_px)[0]) < found.half_width_px for path in paths)
 
 
 def _wanted(standout: Standout, cable: Cable) -> Wanted:

@@ -27,8 +27,7 @@ from pipeline.records import (
     doubtful,
     said_once,
 )
-from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.series import SeriesSettings
+from pipeline.settings.vision import SeriesSettings, VisionSettings
 from pipeline.vision.bearings.covers import VERTICAL_DEG
 from pipeline.vision.bearings.steady import wandering_px
 from pipeline.vision.centerline.axes_of_series import told_by_others
@@ -60,11 +59,6 @@ _MIN_TRAVEL_M = 2e-4  # m; below it rounding of the log and play of the bearings
 
 def trace_series(specimen: Specimen, settings: VisionSettings) -> Traces:
     """Trace every photo of a specimen.
-
-    Parameters
-    ----------
-    specimen : Specimen
-    settings : VisionSettings
 
     Returns
     -------
@@ -173,7 +167,9 @@ def _followed(
     turned, findings = _name_sides(specimen, found, calibration)
     fixed, wandering, shift = wandering_px(found, settings.series.max_fixed_shift_m * calibration.scale.px_per_m)
     if turned:
-        shots = [replace(shot, found=_reversed(shot.found)) for shot in shots]
+        shots = [
+            shot if isinstance(shot.found, Rejected) else replace(shot, found=_reversed(shot.found)) for shot in shots
+        ]
         pairs = zip(shots, cables, strict=True)
         cables = [cable if isinstance(cable, Rejected) else follow(shot.found) for shot, cable in pairs]
     if wandering > 0.0:
@@ -195,7 +191,7 @@ def _tied(shots: list[Shot], cables: Sequence[Followed | Rejected], settings: Vi
     ]
 
 
-def _doubted(line: Centerline | Rejected, calibration: Calibration) -> Centerline | Rejected:
+def _doubted(line: Line, calibration: Calibration) -> Line:
     """Add what its plane leaves open to the band of a centerline; refuse it where that is not finite."""
     if isinstance(line, Rejected):
         return line
@@ -210,9 +206,9 @@ def _name_sides(
 
     Returns whether all cables are to be named from their other ends.
     """
-    axes = np.array([[cable.left.center_px, cable.right.center_px] for cable in found])
     if len(found) < 2:
         return False, ()
+    axes = np.array([[axis.center_px for axis in cable.axes] for cable in found])
     steps = np.hypot(*np.ptp(axes, axis=0).T)  # (2,) px: how far the left and the right axis went
     least = _MIN_TRAVEL_M * float(calibration.scale.px_per_m)
     moving = "left" if steps[0] > steps[1] else "right"
@@ -225,10 +221,8 @@ def _name_sides(
     return False, (doubtful("rig/moving-bearing", moving=moving, stated=specimen.rig.moving_bearing),)
 
 
-def _reversed(found: RoughCable | Rejected) -> RoughCable | Rejected:
+def _reversed(found: RoughCable) -> RoughCable:
     """The same cable named from its other end."""
-    if isinstance(found, Rejected):
-        return found
     last = len(found.path_px) - 1
     return replace(
         found,
@@ -241,12 +235,8 @@ def _reversed(found: RoughCable | Rejected) -> RoughCable | Rejected:
 
 
 def _without_hidden_ends(
-    found: RoughCable | Rejected,
-    line: Centerline | Rejected,
-    specimen: Specimen,
-    calibration: Calibration,
-    settings: VisionSettings,
-) -> Centerline | Rejected:
+    found: RoughCable | Rejected, line: Line, specimen: Specimen, calibration: Calibration, settings: VisionSettings
+) -> Line:
     """Refuse a line from visible end to visible end that is not as long as the cable: bearings hide its ends."""
     if isinstance(found, Rejected) or isinstance(line, Rejected) or found.left.kind not in ("end", "clamp"):
         return line
@@ -258,9 +248,7 @@ def _without_hidden_ends(
     return Rejected(line.image, said, line.preview)
 
 
-def _check_lengths(
-    specimen: Specimen, lines: tuple[Centerline | Rejected, ...], settings: SeriesSettings
-) -> tuple[Finding, ...]:
+def _check_lengths(specimen: Specimen, lines: Sequence[Line], settings: SeriesSettings) -> tuple[Finding, ...]:
     """The cable's length does not change: the best free check of scale, bearings and tracing together."""
     traced = [line for line in lines if isinstance(line, Centerline)]
     if not traced:

@@ -30,6 +30,11 @@ class Shot:
     preview: Preview | None
     size: tuple[int, int] | None = None
 
+    @property
+    def sides(self) -> tuple[int, ...] | None:
+        """Short and long side in px: the same for a photo turned by a quarter."""
+        return None if self.size is None else tuple(sorted(self.size))
+
 
 @dataclass(frozen=True)
 class Search:
@@ -37,9 +42,6 @@ class Search:
 
     Attributes
     ----------
-    specimen : Specimen
-    settings : VisionSettings
-    calibration : Calibration or None
     cover_px : px or None
         Diameter of covers that were seen where nobody gave it.
     """
@@ -92,8 +94,8 @@ class Search:
             # Without a scale the travel in px is unknown: the user's axes hold for the first photo only.
             given = rig.bearings_px if travel == 0.0 and not covered else None
             widths = None if rig.marker_diameter_m is None else rig.marker_diameter_m / specimen.diameter_m
-            cable = Cable(bearings=BearingHints(cover_widths=widths, given_px=given))
-            cable = replace(cable, slenderness=specimen.length_m / specimen.diameter_m)
+            hints = BearingHints(cover_widths=widths, given_px=given)
+            cable = Cable(bearings=hints, slenderness=specimen.length_m / specimen.diameter_m)
         else:
             scale, given = self.calibration.scale.px_per_m, None
             if rig.bearings_px is not None and not covered:

@@ -100,14 +100,12 @@ def _scale_of_covers(search: Search, shots: list[Shot]) -> Calibration | None:
 
 def _with_axes_shown(shot: Shot) -> Shot:
     """Refuse a cable that vanishes under something: without a scale its length cannot show where the axis is."""
-    cable = shot.found
-    if isinstance(cable, Rejected):
+    axes = () if isinstance(shot.found, Rejected) else shot.found.axes
+    clamp = next((axis.center_px for axis in axes if axis.kind == "clamp"), None)
+    if clamp is None:
         return shot
-    clamps = [axis.center_px for axis in cable.axes if axis.kind == "clamp"]
-    if not clamps:
-        return shot
-    u, v = clamps[0]
-    return replace(shot, found=Rejected(cable.image, Message("photo/bearing.vanishes", u_px=u, v_px=v)))
+    said = Message("photo/bearing.vanishes", u_px=clamp[0], v_px=clamp[1])
+    return replace(shot, found=Rejected(shot.found.image, said))
 
 
 def _with_photos(search: Search, shots: list[Shot]) -> Iterator[tuple[Photo, RoughCable]]:
@@ -149,22 +147,12 @@ def with_fixed_cover(
     return settled
 
 
-_CROPPED_LENGTH = 0.03
-"""Relative; of the cable's length in px on a photo of another size: it is found within a third of that, and nobody
-scales a photo by less.
-"""
-
-
 def of_one_size(shots: list[Shot]) -> tuple[list[Shot], tuple[Finding, ...]]:
     """Refuse photos of another size than most that were not merely cropped, and those turned by a quarter.
 
     A photo that was cropped shows the cable as long, in px, as the others do. One that was scaled has a scale of its
     own. On one that was turned by a quarter left and right are told by what was up and down: its bearings may change
     places, and everything along the cable with them.
-
-    Parameters
-    ----------
-    shots : list of Shot
 
     Returns
     -------
@@ -175,31 +163,26 @@ def of_one_size(shots: list[Shot]) -> tuple[list[Shot], tuple[Finding, ...]]:
         ``photo/size`` of each photo that was cropped; of all, where they have no usual size.
     """
     shots = _without_turned(shots)
-    sizes = [tuple(sorted(shot.size)) for shot in shots if shot.size is not None]
+    sizes = [shot.sides for shot in shots if shot.sides is not None]
     usual, count = Counter(sizes).most_common(1)[0] if sizes else ((), 0)
-    lengths = [
-        shot.found.length_px
-        for shot in shots
-        if shot.size is not None and tuple(sorted(shot.size)) == usual and isinstance(shot.found, RoughCable)
-    ]
+    lengths = [shot.found.length_px for shot in shots if shot.sides == usual and isinstance(shot.found, RoughCable)]
     if sizes and 2 * count <= len(sizes):
         each = [f"{shot.found.image} {shot.size[0]} x {shot.size[1]} px" for shot in shots if shot.size is not None]
         return shots, (doubtful("photo/size.several", sizes=each),)
     if not lengths:
         return shots, ()
-    settled, findings = [], []
-    for shot in shots:
-        if shot.size is None or tuple(sorted(shot.size)) == usual:
-            settled.append(shot)
+    settled, findings = list(shots), []
+    for k, shot in enumerate(shots):
+        if shot.size is None or shot.sides == usual:
             continue
         name = shot.found.image
         both = {"size": f"{shot.size[0]} x {shot.size[1]} px", "most": f"{usual[1]} x {usual[0]} px"}
         ratio = shot.found.length_px / float(np.median(lengths)) if isinstance(shot.found, RoughCable) else np.nan
-        if abs(ratio - 1.0) <= _CROPPED_LENGTH:
+        # a length is found within a third of that, and nobody scales a photo by less
+        if abs(ratio - 1.0) <= 0.03:
             findings.append(inferred("photo/size.cropped", image=name, **both))
-            settled.append(shot)
-            continue
-        settled.append(replace(shot, found=Rejected(name, Message("photo/size", **both))))
+        else:
+            settled[k] = replace(shot, found=Rejected(name, Message("photo/size", **both)))
     return settled, tuple(findings)
 
 

@@ -33,12 +33,10 @@ def trace_photo(
 
     Parameters
     ----------
-    path : Path
     diameter_px : px, optional
         Diameter of the cable; measured on the photo if not given.
     hints : PhotoHints, optional
         What a person says about the photo.
-    settings : VisionSettings, optional
 
     Returns
     -------

@@ -22,15 +22,6 @@ from pipeline.vision.single import trace_photo
 MISLED = frozenset({"photo/width", "photo/bearing", "photo/hidden-end", "photo/crossing", "photo/outline"})
 """What photos are refused for when a strip of another width is looked for: edges beside the cable, or half of it."""
 
-LOOKED_AT = 3
-"""Photos that are traced without a diameter; all that can be must agree, and at least two."""
-
-ALIKE = 0.05
-"""Relative; widths on several photos of one cable agree to a percent, those of shadows and highlights do not."""
-
-LEAST_LENGTH, MOST_LENGTH = 0.7, 1.1
-"""Visible length over the stated one: covers hide up to a diameter or three at each end, and photos have a scale."""
-
 
 def with_width_seen(
     specimen: Specimen,
@@ -42,10 +33,8 @@ def with_width_seen(
 
     Parameters
     ----------
-    specimen : Specimen
     traces : Traces
         With the diameter as stated.
-    settings : VisionSettings
     retrace : callable
         Trace a series.
 
@@ -79,7 +68,8 @@ def with_width_seen(
 def _width_seen(specimen: Specimen, traces: Traces, settings: VisionSettings) -> float | None:
     """Width (m) on which a few photos agree that are traced without a diameter; None if it may be the stated one."""
     paths: list[Path] = [specimen.images[photo.image] for photo in traces.photos if photo.image in specimen.images]
-    places = {round(place) for place in np.linspace(0, len(paths) - 1, LOOKED_AT)} if paths else set()
+    # of three photos all that can be traced must agree, and at least two
+    places = {round(place) for place in np.linspace(0, len(paths) - 1, 3)} if paths else set()
     lines = [trace_photo(paths[i], settings=settings) for i in sorted(places)]
     free = [line for line in lines if isinstance(line, Centerline)]
     px_per_m = specimen.camera.scale_px_per_m or traces.scale.px_per_m
@@ -88,8 +78,10 @@ def _width_seen(specimen: Specimen, traces: Traces, settings: VisionSettings) ->
         return None
     widths = np.array([line.width_m for line in free]) / px_per_m
     lengths = np.array([line.traced_length_m for line in free]) / px_per_m / specimen.length_m
-    alike = np.ptp(widths) < ALIKE * np.median(widths)
-    whole = lengths.min() > LEAST_LENGTH and lengths.max() < MOST_LENGTH
+    # widths of one cable agree to a percent, those of shadows and highlights do not
+    alike = np.ptp(widths) < 0.05 * np.median(widths)
+    # covers hide up to a diameter or three at each end, and photos have a scale
+    whole = lengths.min() > 0.7 and lengths.max() < 1.1
     width = float(np.median(widths))
     off = abs(width / specimen.diameter_m - 1.0) > WIDTH_OFF
     return width if alike and whole and off else None

@@ -13,7 +13,7 @@ nothing is seen where it looks as the ground does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ from scipy.cluster.vq import kmeans2
 from pipeline.records import Array
 from pipeline.vision.median import medians, scatter
 from pipeline.vision.photo import Photo, reduce_area, values_at
-from pipeline.vision.search.backdrop import MIN_GROUND_STD, ROWS, choose_reduction, reduced, stand_out
+from pipeline.vision.search.backdrop import MIN_GROUND_STD, ROWS, bands, choose_reduction, reduced, stand_out
 
 _ALIKE = 0.5  # of the step from ground to cable; a pixel nearer to the cable's colour than that is taken for it
 _FAINT = 5.0  # standard deviations of noise; a step from ground to cable of so many is weighed half
@@ -64,7 +64,7 @@ class Ground:
         noise = [max(scatter(each, 0.0), MIN_GROUND_STD) for each in np.moveaxis(off, -1, 0)]
         faint = (_FAINT * float(np.hypot.reduce(noise))) ** 2
         share = np.empty(photo.pixels.shape[:2], np.uint16)
-        for rows in _bands(photo):
+        for rows in bands(photo):
             ground = _lit(self.picture, rows, gains)
             step = np.asarray(self.colour * gains, np.float32) - ground
             along = ((_values(photo, rows) - ground) * step).sum(axis=2)
@@ -92,7 +92,7 @@ def _median(photos: Sequence[Photo], colour: Array | None = None, near: float = 
     """Median of photos as the first is lit, where some of them are not ``near`` a colour (c,), of those."""
     first, gains = photos[0], [_gains(photo, photos[0]) for photo in photos]
     picture = np.empty((*first.pixels.shape[:2], first.channels), np.uint16)
-    for rows in _bands(first):
+    for rows in bands(first):
         lit = np.stack([_lit(photo, rows, gain) for photo, gain in zip(photos, gains, strict=True)], axis=-1)
         known = np.full(lit.shape[:2], len(photos))
         if colour is not None:
@@ -109,15 +109,10 @@ def _median(photos: Sequence[Photo], colour: Array | None = None, near: float = 
 def _moved(photo: Photo, ground: Photo) -> Array:
     """Colours (n, c) of what stands out of the ground on a photo, in the light of the ground."""
     gains, reduction = _gains(ground, photo), choose_reduction(photo.size, None)
-    coded = [_coded(0.5 + 0.5 * (_values(photo, rows) - _lit(ground, rows, gains))) for rows in _bands(photo)]
+    coded = [_coded(0.5 + 0.5 * (_values(photo, rows) - _lit(ground, rows, gains))) for rows in bands(photo)]
     standout = stand_out(Photo(photo.name, np.concatenate(coded).reshape(photo.pixels.shape), 16), reduction)
     away = standout.distance > standout.levels[0]
     return np.asarray(reduced(photo, reduction).picture[away] * _gains(photo, ground))
-
-
-def _bands(photo: Photo) -> Iterator[slice]:
-    """The rows of a photo, some at a time."""
-    return (slice(start, start + ROWS) for start in range(0, photo.size[1], ROWS))
 
 
 def _values(photo: Photo, rows: slice) -> NDArray[np.float32]:

@@ -14,9 +14,6 @@ from pipeline.vision.segmentation import lies_on
 from pipeline.vision.series_search import Search, Shot, count_alike
 from pipeline.vision.still_ground import Ground, colour_along, moved_colours
 
-_LEAST_PHOTOS = 3  # of two nobody knows which shows the ground
-_MOST_PHOTOS = 7  # held at once; they tell the ground to half of a photo's noise
-
 
 def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
     """The photos of a series with the cables found without what stands still in it.
@@ -28,9 +25,10 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
     alike = [k for k, size in usable.items() if size in dict(Counter(usable.values()).most_common(1))]
     most = search.settings.series.max_length_deviation
     doubted = count_alike([shots[k] for k in alike], most) < len(alike)
-    if not doubted or len(alike) < _LEAST_PHOTOS:
+    if not doubted or len(alike) < 3:  # of two nobody knows which shows the ground
         return shots
-    chosen = sorted({alike[i] for i in np.linspace(0, len(alike) - 1, _MOST_PHOTOS).astype(int)})
+    # seven held at once tell the ground to half of a photo's noise
+    chosen = sorted({alike[i] for i in np.linspace(0, len(alike) - 1, 7).astype(int)})
     photos = {k: photo for k in chosen if isinstance(photo := search.load(shots[k].step), Photo)}
     held, sought = list(photos.values()), {k: shots[k] for k in alike}
     farthest = max(photos, key=lambda k: abs(shots[k].step.displacement_m - shots[0].step.displacement_m))
@@ -72,5 +70,6 @@ def _is_spoilt(shot: Shot) -> bool:
 
 def _is_same(old: RoughCable | Rejected, new: RoughCable, most: float) -> bool:
     """True if it was on the same course before, as long to a relative deviation."""
-    same = isinstance(old, RoughCable) and lies_on(old, [new.path_px])
-    return same and abs(new.length_px / old.length_px - 1.0) <= most
+    if isinstance(old, Rejected):
+        return False
+    return lies_on(old, [new.path_px]) and abs(new.length_px / old.length_px - 1.0) <= most

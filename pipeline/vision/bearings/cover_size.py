@@ -83,8 +83,7 @@ def cover_radius(seen: Iterable[tuple[Photo, RoughCable]]) -> float | None:
 
 def visible_ends(cable: RoughCable) -> tuple[CableEnd, CableEnd]:
     """The first and the last point in which the cable is seen, with the direction in which it goes on."""
-    first, last = cable.visible
-    body, width = cable.path_px[first : last + 1], 2.0 * cable.half_width_px
+    body, width = cable.seen_px, 2.0 * cable.half_width_px
     return CableEnd(body[0], end_direction(body[::-1], width)), CableEnd(body[-1], end_direction(body, width))
 
 

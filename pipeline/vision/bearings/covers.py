@@ -24,14 +24,7 @@ from numpy.typing import NDArray
 
 from pipeline.records import Array
 from pipeline.vision.bearings.cut import cover_by_cut
-from pipeline.vision.bearings.rim import (
-    MIN_RIM,
-    RADIUS_STD,
-    SURE_RIM,
-    Circle,
-    Radius,
-    fit_circle,
-)
+from pipeline.vision.bearings.rim import MIN_RIM, RADIUS_STD, SURE_RIM, Circle, Radius, fit_circle
 from pipeline.vision.bearings.rings import MARK_CELLS, SAME_AXIS_RADII, find_marks, with_rings
 from pipeline.vision.median import median
 from pipeline.vision.photo import Photo
@@ -41,30 +34,16 @@ from pipeline.vision.search.ends import CableEnd
 
 _RING_WIDTH = 0.05  # radii; std of the ring that seeks centres: as well as the radius is known
 _MARK_RADII = 0.95  # radii of a cover; largest dot, screw, bevel or bright middle that marks the axis of one not seen
-_SEEN_REACH_RADII = 2.5
-"""Radii; the cover of a neighbouring photo is this one's too if the cable's end is so near: the stub beyond a cover or
-a shadow beside it lead an end astray by two.
-"""
-_SOFT_RIM_PX = 2.5  # px; blur of a rim that is sought where no sharp one is seen: focus lost, or 3 % noise
-_MIN_SOFT_RIM = 0.5
-"""Share of the rim where it is sought as a soft one: neighbouring directions share more, so chance gives more; focus
-lost left 0.6, a moved camera, whose rim is doubled, 0.45.
-"""
 _ASIDE_STD_RADII = 0.25  # radii; how far aside of the visible cable's direction the centre lies: bend under the cover
 _REACH_RADII = 4.1
 """Radii; how far from where the cable's mask ends the centre of its cover may lie: a stub beyond it, or letters before
 it, are as long as a diameter.
 """
 _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
-_CANDIDATES = 3  # best voted centres that are fitted; the rim decides among them
 
 PixelPair = tuple[tuple[float, float], tuple[float, float]]
 
 VERTICAL_DEG = 10.0  # degrees; a chord nearer to the vertical has no left end that a person would agree on
-_GIVEN_STD_PX = 1.0  # px; how well a person reads an axis off a screen
-_RADIUS_STD_BY_CABLE = 0.05  # relative; where only the cable's width on the photo tells the scale
-_SAME_END = 0.1  # radii of a cover, rad and relative; strips that end so near and alike show one cover or none
-_END_STD_WIDTHS = 0.1  # widths; a cut or clamped end is found to about a tenth of the cable's width
 
 
 def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Circle | None:
@@ -72,7 +51,6 @@ def find_cover(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> 
 
     Parameters
     ----------
-    photo : Photo
     end : CableEnd
         Where the cable's mask ends: at the rim, or beyond it where cover and cable look alike.
     radius : Radius
@@ -112,10 +90,12 @@ def find_rim(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -> Ci
     # Mostly the mask ends at the rim and all behind it is cable.
     # Where a block or a shadow hides the last of the cable, its mask ends early, and where an arm looks like the cable
     # it runs on beyond the cover: a whole rim farther on or farther back is the cover's.
+    # Focus lost, or 3 % noise, leaves a rim blurred by 2.5 px; neighbouring directions share more then, so chance gives
+    # more of one: focus lost left 0.6, a moved camera, whose rim is doubled, 0.45.
     partial: Circle | None = None
     tries = (
         (along < 0.0, prior, 1.0, MIN_RIM),
-        (along < 0.0, prior, _SOFT_RIM_PX, _MIN_SOFT_RIM),
+        (along < 0.0, prior, 2.5, 0.5),
         (along < -np.inf, anywhere, 1.0, np.inf),
     )
     for blind, where, softness, least in tries:
@@ -135,7 +115,7 @@ def _best_circle(
 ) -> Circle | None:
     """The circle with the most of its rim seen among the centres of the window with the most votes."""
     best: Circle | None = None
-    for _ in range(_CANDIDATES):
+    for _ in range(3):  # the rim decides among the best voted
         v, u = np.unravel_index(int(np.argmax(votes)), votes.shape)
         circle = fit_circle(photo, window.to_pixels(np.array([u, v], float)), radius, softness=softness)
         if circle is not None and (best is None or circle.rim > best.rim + 0.02):
@@ -245,13 +225,14 @@ def find_bearings(
     radius = hints.cover_radius(width_px)
     if radius is None:
         return _visible_end(ends[0], width_px), _visible_end(ends[1], width_px)
-    std = RADIUS_STD if hints.cover_px is not None else _RADIUS_STD_BY_CABLE
-    expected = Radius(radius, std)
+    # without a scale only the cable's width on the photo tells it
+    expected = Radius(radius, RADIUS_STD if hints.cover_px is not None else 0.05)
     axes: list[Bearing | None] = [None, None]
     for k, end in enumerate(ends):
-        # strips of all readings of a photo end at a few places: each is searched once
+        # strips of all readings of a photo end at a few places: each is searched once, and those that end as near and
+        # alike as a tenth (radii, rad and relative) show one cover or none
         known = np.concatenate([end.place / radius, end.outward, np.log([radius, width_px])])
-        alike = [found for other, found in hints.sought if np.abs(known - other).max() < _SAME_END]
+        alike = [found for other, found in hints.sought if np.abs(known - other).max() < 0.1]
         if not alike:
             alike = [find_cover(photo, end, expected, width_px)]
             hints.sought.append((known, alike[0]))
@@ -267,7 +248,8 @@ def find_bearings(
 def _where_seen(photo: Photo, end: CableEnd, seen: tuple[Bearing, ...], expected: Radius) -> Circle | None:
     """The cover of a neighbouring photo, all round in its place, near an end that was led astray beyond it."""
     for cover in seen:
-        if np.hypot(*np.subtract(cover.center_px, end.place)) <= _SEEN_REACH_RADII * expected.px:
+        # the stub beyond a cover or a shadow beside it lead an end astray by two radii
+        if np.hypot(*np.subtract(cover.center_px, end.place)) <= 2.5 * expected.px:
             circle = fit_circle(photo, np.array(cover.center_px), expected)
             if circle is not None and circle.rim >= SURE_RIM:
                 return with_rings(photo, circle, expected)
@@ -279,13 +261,14 @@ def _assign_given(ends: tuple[CableEnd, CableEnd], given: PixelPair) -> tuple[Be
     straight = np.hypot(*(a - ends[0].place)) + np.hypot(*(b - ends[1].place))
     crossed = np.hypot(*(b - ends[0].place)) + np.hypot(*(a - ends[1].place))
     first, second = (a, b) if straight <= crossed else (b, a)
-    bearings = [Bearing((float(p[0]), float(p[1])), _GIVEN_STD_PX, kind="given") for p in (first, second)]
+    # a person reads an axis off a screen to a pixel
+    bearings = [Bearing((float(p[0]), float(p[1])), 1.0, kind="given") for p in (first, second)]
     return bearings[0], bearings[1]
 
 
 def _visible_end(end: CableEnd, width_px: float) -> Bearing:
     kind: AxisKind = "clamp" if end.at_object else "end"
-    std = _END_STD_WIDTHS * width_px
+    std = 0.1 * width_px  # a cut or clamped end is found to about that
     return Bearing((float(end.place[0]), float(end.place[1])), std, kind=kind)
 
 

@@ -32,10 +32,8 @@ def cover_by_cut(photo: Photo, end: CableEnd, radius: Radius, width_px: float) -
 
     Parameters
     ----------
-    photo : Photo
     end : CableEnd
         Where the cable's mask ends: on the rim, or where a stub of it beyond the cover does.
-    radius : Radius
     width_px : px
         Of the cable.
     """

@@ -31,12 +31,8 @@ SAME_RADIUS = 0.04  # relative; covers of one rig are turned alike, light and bl
 RIM_OVER_TEXTURE = 2.5  # ratio to the median slope of the rays; weaker edges are noise and texture
 CENTER_STD_FLOOR_PX = 0.02  # px; light and rounding of the cover move the centre by so much whatever the noise
 _LIGHT_REACH_PX = 4.0  # px; half range about an edge in which the light's slopes are fitted with it
-_BEVEL_SPREAD_SHARE = 0.22
-"""Of the rim's blur; standard deviation of what a bevel moves the rim all round: half at most on 18 rendered covers."""
 _RIM_TOLERANCE = 0.015  # radii; an edge so near to the circle belongs to the rim, chance edges spread ten times wider
 _LEAST_TOLERANCE_PX, _MOST_TOLERANCE = 0.75, 0.1  # px, as pixels allow; radii of a small cover, near which chance lies
-_POOLED_RAYS = 1.5  # rays; standard deviation of the pooling along the rim
-_DIRECTIONS = 160  # rays of the circle fit at most; more share their pixels and tell little new
 
 
 @dataclass(frozen=True)
@@ -84,7 +80,7 @@ def fit_circle(
     beside it, the next ring would pass for one; and nobody knows its radius, so that proves nothing.
     """
     radius = expected.px
-    count = int(np.clip(2.0 * np.pi * radius, 90, _DIRECTIONS))
+    count = int(np.clip(2.0 * np.pi * radius, 90, 160))  # more rays share their pixels and tell little new
     angle = np.arange(count) * (2.0 * np.pi / count)
     ray = np.column_stack([np.cos(angle), np.sin(angle)])
     span = max(4.0, SEARCH_RADII * radius)
@@ -117,8 +113,9 @@ def fit_circle(
     std = float(np.linalg.norm([np.sqrt(0.5 * np.trace(covariance[:2, :2])), CENTER_STD_FLOOR_PX, 0.5 * excess]))
     # Seen all round, the radius is what it is: that it is not the expected one tells of the scale, not of the rim.
     doubt = 0.0 if rim >= SURE_RIM else excess
-    # A bevel as narrow as the blur moves the steepest place all round, and no scatter tells of it.
-    bevel = _BEVEL_SPREAD_SHARE * float(np.sqrt(max(_spread(slopes, edge)[2] ** 2 - softness**2, 0.0)))
+    # A bevel as narrow as the blur moves the steepest place all round, by half of it at most on 18 rendered covers, and
+    # no scatter tells of it.
+    bevel = 0.22 * float(np.sqrt(max(_spread(slopes, edge)[2] ** 2 - softness**2, 0.0)))
     parts = [np.sqrt(covariance[2, 2]), CENTER_STD_FLOOR_PX, doubt, bevel]
     radius_std = float(np.linalg.norm(parts))
     return Circle((float(parameters[0]), float(parameters[1])), float(parameters[2]), std, radius_std, rim)
@@ -155,7 +152,7 @@ def _radial_slopes(
     # Rays are pooled with their neighbours along the rim: noise falls, and the rim stays where it is.
     pooled = gaussian_filter(
         np.gradient(profile, 0.5, axis=1),
-        (_POOLED_RAYS * softness, 2.0 * softness, 0.0),
+        (1.5 * softness, 2.0 * softness, 0.0),
         mode=("wrap", "reflect", "wrap"),
     )
     slope: NDArray[np.float32] = np.asarray(pooled)

@@ -31,12 +31,10 @@ from pipeline.vision.photo import Photo, reduce_area, values_at
 
 MARK_CELLS = 12.0  # cells; a mark's largest radius in the picture it is searched on: a line stays a cell wide
 SAME_AXIS_RADII = 0.03  # radii; a ring farther off was not turned on the axis: a sticker, a hole beside it
-_MARK_TRIES = 4  # roundest places where a mark is fitted: edges of cover and shadow pass for round ones
 _ASTRAY_RADII = 0.16  # radii; how far a rim that is not sure may lie off the centre: half a bevel
 _RING_RANGE = (0.1, 0.96)  # radii; where dots, grooves and bevels lie: below is a punch mark, above the rim
 _TURNED_RADII = 0.8  # radii; of what lies on a cover: its rim and the shade beside it are not compared
 _ALIKE_TURNED = 0.8  # correlation of a cover with itself turned by half a turn from which that is no chance
-_RINGS = 2  # rings of a cover that are fitted at most: the strongest tell the most
 
 
 def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
@@ -44,10 +42,8 @@ def with_rings(photo: Photo, rim: Circle, expected: Radius) -> Circle:
 
     Parameters
     ----------
-    photo : Photo
     rim : Circle
         Fitted to the rim.
-    expected : Radius
 
     Returns
     -------
@@ -113,15 +109,10 @@ def find_marks(photo: Photo, places: Array, reach: float) -> list[Circle]:
 
     Parameters
     ----------
-    photo : Photo
     places : (k, 2) px
         Where its centre may be, closer together than a cell of the search (``MARK_CELLS`` to the reach).
     reach : px
         Largest radius of the ring.
-
-    Returns
-    -------
-    list of Circle
     """
     reduction = max(1, int(reach / MARK_CELLS))
     low = np.maximum(np.floor(places.min(axis=0) - 1.2 * reach).astype(int), 0)
@@ -138,7 +129,7 @@ def find_marks(photo: Photo, places: Array, reach: float) -> list[Circle]:
         [(_slopes(small, group, reach / reduction, 0.7) ** 2).sum(axis=(1, 2)) for group in groups]
     )
     found: list[Circle] = []
-    for _ in range(_MARK_TRIES):
+    for _ in range(4):  # edges of cover and shadow pass for round places
         place = places[int(np.argmax(roundness))]
         found += _rings(photo, _roundest(photo, place, reach), reach)
         roundness[np.hypot(*(places - place).T) < 0.3 * reach] = -1.0
@@ -175,7 +166,7 @@ def _rings(photo: Photo, center: Array, radius: float) -> list[Circle]:
     slope[(distance < _RING_RANGE[0] * radius) | (distance > _RING_RANGE[1] * radius)] = 0.0
     least = RIM_OVER_TEXTURE * median(slope[slope > 0.0]) if slope.any() else np.inf
     found: list[Circle] = []
-    for _ in range(_RINGS):
+    for _ in range(2):  # the strongest rings tell the most
         at = int(np.argmax(slope))
         if slope[at] <= least:
             break

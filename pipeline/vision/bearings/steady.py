@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records import Array, Side
+from pipeline.vision.bearings.covers import PixelPair
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.scale.plane import PlaneMap
-
-Pair = tuple[tuple[float, float], tuple[float, float]]
 
 _SIDES: tuple[Side, Side] = ("left", "right")
 _LEAST_STEADY = 3  # photos; of two that differ nothing tells which one shows the fixed bearing in its place
@@ -24,7 +23,7 @@ _ASTRAY = 4.0  # standard deviations; a cover that stands still is found so far 
 _STEADY_SHARE = 0.6  # of the photos; so many show the fixed bearing in one place, or the camera moved
 
 
-def moved_axes(axes: Pair, moving: Side, travel: float, plane: PlaneMap) -> Pair:
+def moved_axes(axes: PixelPair, moving: Side, travel: float, plane: PlaneMap) -> PixelPair:
     """Left and right axis, px, after the moving bearing went ``travel`` (m) toward the fixed one, in their plane.
 
     A lens or a tilt shows a millimetre longer in one place than in another.

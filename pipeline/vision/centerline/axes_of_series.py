@@ -32,9 +32,6 @@ import numpy as np
 from pipeline.records import Array
 
 _PARALLAX = 3  # the first so many of what photos share: covers seen too far out; the others are lids beside their axes
-_NEAR = 6  # halvings of the usual play and lid: a tenth of a millimetre becomes a micrometre, below any photo's noise
-_FAR = 3  # halvings of the usual parallax: a camera twice as far and covers a quarter as high
-_STRANGE = 9.2  # squared distance of two misses from what is expected, in standard deviations: once in a hundred
 
 
 @dataclass(frozen=True)
@@ -89,7 +86,9 @@ def told_by_others(sights: Sequence[AxisSight]) -> list[AxesTold]:
         return [told_alone(sight) for sight in sights]
     middle = np.mean([sight.places for sight in sights], axis=(0, 1))
     commons = [_common(sight, middle) for sight in sights]
-    sizes = np.array([(0.5**far, 0.5**near) for far in range(_FAR + 1) for near in range(_NEAR + 1)])
+    # Parallax halved thrice: a camera twice as far and covers a quarter as high; play and lid of a tenth of a
+    # millimetre six times: a micrometre, below any photo's noise.
+    sizes = np.array([(0.5**far, 0.5**near) for far in range(4) for near in range(7)])
     terms = [_terms(sight, common, sizes[:, 1]) for sight, common in zip(sights, commons, strict=True)]
     total = [np.sum(parts, axis=0) for parts in zip(*terms, strict=True)]
     others = [[all_of - own for all_of, own in zip(total, mine, strict=True)] for mine in terms]
@@ -142,6 +141,6 @@ def _expected(
     off = shifts - shift
     covariance = np.einsum("k,kij->ij", weight, each) + (off.T * weight) @ off
     apart = sight.miss - shift
-    if apart @ np.linalg.solve(covariance + sight.covariance, apart) > _STRANGE:
+    if apart @ np.linalg.solve(covariance + sight.covariance, apart) > 9.2:  # once in a hundred
         covariance = covariance + np.diag(apart**2)
     return AxesTold(shift, covariance)

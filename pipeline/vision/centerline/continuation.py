@@ -28,7 +28,7 @@ from scipy.interpolate import BSpline
 
 from pipeline.records import Array
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
-from pipeline.vision.centerline.curvature import DEGREE, PlaneCurve
+from pipeline.vision.centerline.curvature import DEGREE, PlaneCurve, normals
 from pipeline.vision.centerline.curve_fit import CurveFit, rms_of_bow
 from pipeline.vision.median import quantile
 from pipeline.vision.scale.plane import ChordFrame
@@ -57,20 +57,18 @@ def continue_to_axes(
 
     Parameters
     ----------
-    fit : CurveFit
     covariance : (p, p)
         Of the curve's parameters, the light's errors included.
-    chord : ChordFrame
     width : m
         Of the cable.
     told : AxesTold, optional
         What the other photos of the series tell of how the cable passes the axes.
     """
     rows, values, noise = _bow_at_ends(fit, covariance)
-    past, misses, normals = _axes(fit, chord)
+    past, misses, across = _axes(fit, chord)
     if chord.marked:
         if told is None:
-            told = told_alone(_sight(misses, np.eye(2), normals, chord, _AXIS_PLAY_WIDTHS * width))
+            told = told_alone(_sight(misses, np.eye(2), across, chord, width))
         shift, loose = told.shift, told.covariance + chord.axis_std**2 * np.eye(2)
     else:  # a visible end tells roughly where the curve ends, where its last sections are lost
         shift, loose = np.zeros(2), (_END_WIDTHS * width) ** 2 * np.eye(2)
@@ -88,16 +86,16 @@ def sight_of_axes(fit: CurveFit, covariance: Array, chord: ChordFrame, *, width:
     if not chord.marked:
         return None
     step, covariance = _updated(covariance, *_bow_at_ends(fit, covariance))
-    rows, misses, normals = _axes(fit, chord)
+    rows, misses, across = _axes(fit, chord)
     loose = rows @ covariance @ rows.T + chord.axis_std**2 * np.eye(2)
     if not (np.isfinite(misses).all() and np.isfinite(loose).all()):
         return None  # what broke on one photo shall not reach the others
-    return _sight(misses - rows @ step, loose, normals, chord, _AXIS_PLAY_WIDTHS * width)
+    return _sight(misses - rows @ step, loose, across, chord, width)
 
 
-def _sight(misses: Array, covariance: Array, normals: Array, chord: ChordFrame, play: float) -> AxisSight:
-    places = chord.origin + chord.axes @ chord.rotation
-    return AxisSight(misses, covariance, places, normals @ chord.rotation, chord.axis_parallax_std, play)
+def _sight(misses: Array, covariance: Array, across: Array, chord: ChordFrame, width: float) -> AxisSight:
+    places, play = chord.origin + chord.axes @ chord.rotation, _AXIS_PLAY_WIDTHS * width
+    return AxisSight(misses, covariance, places, across @ chord.rotation, chord.axis_parallax_std, play)
 
 
 def _updated(covariance: Array, rows: Array, values: Array, noise: Array) -> tuple[Array, Array]:
@@ -153,5 +151,5 @@ def _axes(fit: CurveFit, chord: ChordFrame) -> tuple[Array, Array, Array]:
     curve = fit.curve
     feet = curve.foot(chord.axes, np.array([0.0, curve.frame.knots[-1]]))
     where, angle = curve.at(feet)
-    normals = np.column_stack([-np.sin(angle), np.cos(angle)])
-    return curve.normal_basis(feet), ((chord.axes - where) * normals).sum(axis=1), normals
+    across = normals(angle)
+    return curve.normal_basis(feet), ((chord.axes - where) * across).sum(axis=1), across

@@ -26,7 +26,6 @@ from pipeline.vision.centerline.smoothing import Problem, Smooth
 from pipeline.vision.median import median, scatter
 from rod.measurement import slow_covariance
 
-_ITERATIONS = 8  # of a fit, at most
 _BIAS_SHARE = 0.5
 """Part of the penalty's bias that counts as uncertainty: an equilibrium is smoother than the penalty's random walk;
 with 1 the 95 % band of kappa covered 98.6 % of smooth bows, with 0 92 %, with 0.5 97 %.
@@ -39,7 +38,6 @@ class CurveFit:
 
     Attributes
     ----------
-    curve : PlaneCurve
     smooth : Smooth
         Covariance of q and gain on the points' normal displacements.
     points : (n, 2)
@@ -85,14 +83,7 @@ def initial_curve(points: Array, s: Array, frame: Frame) -> PlaneCurve:
     return PlaneCurve(frame, solution[1:], np.mean(points - curve.at(s)[0], axis=0), float(solution[0]))
 
 
-def fit_curve(
-    points: Array,
-    std: Array,
-    *,
-    start: PlaneCurve,
-    s: Array,
-    longest: float,
-) -> CurveFit:
+def fit_curve(points: Array, std: Array, *, start: PlaneCurve, s: Array, longest: float) -> CurveFit:
     """Curve through points ``(n, 2)`` with relative errors ``std`` ``(n,)`` along the normal, by Gauss-Newton.
 
     Parameters
@@ -107,7 +98,7 @@ def fit_curve(
     curve, weight, moved = start, np.ones(len(points)), 0.0
     # The correlation is sought once, when the curve is nearly there: each search costs seven factorisations.
     length = median(np.diff(s))
-    for iteration in range(_ITERATIONS):
+    for iteration in range(8):
         s, residual = _step_to_foot(curve, points, s)
         spread = max(scatter(residual / std, 0.0), 1e-12)
         if iteration:

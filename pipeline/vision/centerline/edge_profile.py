@@ -39,9 +39,6 @@ _USUAL_RAMP = 0.07
 halo, grid and texture: of thin cables, whose few pixels do not tell them apart, free ramps moved the midline by a third
 more.
 """
-_LEAST_OF_USUAL = 0.1  # of the usual step; a section of less is mostly noise
-_ITERATIONS = 5  # of edges on sections, at most
-_PROFILE_WINDOWS = 16  # along the cable; in each, blur and shading of the edges are found: light turns slowly
 
 
 @dataclass(frozen=True)
@@ -122,7 +119,7 @@ def in_one_light(pixels: Pixels) -> tuple[Pixels, Array, Array]:
     rows = pixels.value.reshape(*shape[:2], -1, pixels.across)
     inner, outer = (medians(part.reshape(*shape[:2], -1), axis=2) for part in (rows[..., :each], rows[..., -each:]))
     usual = median(outer - inner)
-    gain = usual / np.maximum(outer - inner, _LEAST_OF_USUAL * usual)
+    gain = usual / np.maximum(outer - inner, 0.1 * usual)  # a section of less is mostly noise
     zero = median(outer) - gain * outer
     alike = np.asarray(zero[..., None] + gain[..., None] * pixels.value, np.float32)
     return replace(pixels, value=alike), zero, gain
@@ -134,7 +131,7 @@ def fit_profiles(pixels: Pixels, s: Array, *, blur: float) -> Profiles:
     Medians over the rows come first: letters cover less than half of any line along the cable, and a mean would take
     them for the sheath.
     """
-    count = min(_PROFILE_WINDOWS, max(1, len(s) // 4))
+    count = min(16, max(1, len(s) // 4))  # light turns slowly
     each = len(s) // count
     # Windows of one size make one array of all; at most one section of each window is passed over for it.
     chosen = ((np.arange(count * each) + 0.5) * (len(s) / (count * each))).astype(np.int64)
@@ -314,7 +311,7 @@ def fit_edges(
     basis, one = np.empty((len(value), 3, count), np.float32), np.ones((1, 1), np.float32)
     basis[:, 0] = 1.0
     gram, weight = np.zeros((len(value), 3, 3)), np.ones_like(value)
-    for _ in range(_ITERATIONS):
+    for _ in range(5):
         place32, level32, step32 = (a.astype(np.float32)[:, None] for a in (place, level, step))
         basis[:, 1], slope = _shaded(offset, place32, blur, one, (inside, outside))
         basis[:, 2] = -step32 * slope

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.records import Array
-from pipeline.vision.centerline.curvature import PlaneCurve
+from pipeline.vision.centerline.curvature import PlaneCurve, normals
 from pipeline.vision.centerline.edge_profile import Pixels
 from pipeline.vision.median import median, medians, scatter
 from pipeline.vision.photo import Closeup, straightened
@@ -38,11 +38,6 @@ false edge (highlight, text) is mostly farther.
 """
 
 _TOGETHER = 2.0  # scatter of half the width over that of the middle; edges that err each by itself have 1
-
-
-def normals(angle: Array) -> Array:
-    """Unit normals ``(n, 2)``: direction of t."""
-    return np.column_stack([-np.sin(angle), np.cos(angle)])
 
 
 def in_picture(closeup: Closeup, curve: PlaneCurve, s: Array, reach: float) -> NDArray[np.bool_]:
@@ -142,13 +137,11 @@ def edge_pixels(
     where, angle = curve.at(all_s)
     across = normals(angle)
     out, expected = np.arange(-np.ceil(window[0]), np.ceil(window[1]) + 1.0), outline(all_s)[..., None]
-    t = np.array([-1.0, 1.0])[:, None, None] * (expected + out)  # side, row, pixel
+    side = np.array([-1.0, 1.0])[:, None, None]
+    t = side * (expected + out)  # side, row, pixel
     u = np.rint(where[:, :1] + across[:, :1] * t)
     v = np.rint(where[:, 1:] + across[:, 1:] * t)
-    offset = (
-        np.array([-1.0, 1.0])[:, None, None] * ((u - where[:, :1]) * across[:, :1] + (v - where[:, 1:]) * across[:, 1:])
-        - expected
-    )
+    offset = side * ((u - where[:, :1]) * across[:, :1] + (v - where[:, 1:]) * across[:, 1:]) - expected
     height, width = closeup.grey.shape
     column = np.clip(u.astype(np.int64) - closeup.origin_px[0], 0, width - 1)
     row = np.clip(v.astype(np.int64) - closeup.origin_px[1], 0, height - 1)

@@ -38,14 +38,6 @@ _HIGHEST = 30
 _LENGTHS = np.geomspace(0.01, 0.06, 7)
 """Of the seen length, correlation lengths tried: from what the finest polynomial resolves to what the coarsest does."""
 
-_USUAL = 0.04
-"""Of the seen length, correlation length of a photo's own waves: in the middle of those tried."""
-
-_SIZES = 40
-"""Variances tried, a factor 1.27 apart."""
-
-_PLACES = 240
-"""Of an even grid on which the waves' share in each polynomial is computed."""
 _LEAST_WAVE_PX = 0.01
 """Px; waves in a midline that no width need show: grid of pixels, demosaicing, tone curve; of this size they are on
 photos of even light and little noise.
@@ -100,7 +92,7 @@ def edge_waves(photos: Sequence[HalfWidths], *, metres_per_px: float, lay: float
     seen, least = seen_waves(photos), _LEAST_WAVE_PX * metres_per_px
     reach = median(np.array([np.ptp(photo.s) for photo in photos]))
     own, common = np.hypot(seen.own, least), np.linalg.norm([seen.common, 0.5 * least, lay])
-    return Waves(float(own), float(common), seen.length or _USUAL * reach)
+    return Waves(float(own), float(common), seen.length or 0.04 * reach)  # in the middle of those tried
 
 
 def seen_waves(photos: Sequence[HalfWidths]) -> Waves:
@@ -117,9 +109,9 @@ def seen_waves(photos: Sequence[HalfWidths]) -> Waves:
     coarsest = _SLOW_WIDTH_ORDER + 1
     found = np.array([_components(photo)[:, coarsest:] for photo in told])  # (photos, 2, k)
     counts = np.array([len(photo.s) for photo in told], float)
-    # of the waves' variances: nothing, then all up to what would be the whole of the widths' own
+    # of the waves' variances: nothing, then all up to what would be the whole of the widths' own, by factors of 1.27
     largest = float(np.mean(np.sum(found[:, 0] ** 2, axis=1) / counts))
-    variances = np.r_[0.0, largest * np.geomspace(1e-3, 10.0, _SIZES)]
+    variances = np.r_[0.0, largest * np.geomspace(1e-3, 10.0, 40)]
     value = np.array([_surprise(found, counts, share, variances) for share in _shares()[:, coarsest:]])
     length, own, common = np.unravel_index(int(np.argmin(value)), value.shape)
     if value[0, 0, 0] - value[length, own, common] < _LEAST_WAVE_GAIN:
@@ -170,11 +162,11 @@ def _scatter(rows: Array, s: Array, length: float) -> Array:
 
 def _shares() -> Array:
     """What waves of unit variance put on each polynomial, per section: (lengths, k)."""
-    t = np.linspace(-1.0, 1.0, _PLACES)
+    t = np.linspace(-1.0, 1.0, 240)
     basis = _polynomials(t)
     apart = 0.5 * np.subtract.outer(t, t)
     waves = [np.exp(-0.5 * (apart / length) ** 2) for length in _LENGTHS]
-    return np.array([np.sum(basis * (wave @ basis), axis=0) for wave in waves]) / _PLACES
+    return np.array([np.sum(basis * (wave @ basis), axis=0) for wave in waves]) / len(t)
 
 
 def _polynomials(t: Array) -> Array:

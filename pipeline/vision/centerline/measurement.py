@@ -24,17 +24,12 @@ from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
+from pipeline.vision.centerline.curvature import normals
 from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_errors, std_along
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
-from pipeline.vision.centerline.refusal import (
-    beside_axis,
-    feet_of_axes,
-    middle_width,
-    refusal,
-    refusal_of_band,
-)
+from pipeline.vision.centerline.refusal import beside_axis, feet_of_axes, middle_width, refusal, refusal_of_band
 from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
@@ -46,13 +41,7 @@ LIGHT_LENGTH_SHARE = 0.35
 """Of the seen length; correlation length of the light's error: it follows the cable's direction, which turns once from
 end to end; over 135 scenes 0.35 was likelier than 0.25 and 0.5.
 """
-_HIDDEN_WIDTHS = 0.5  # a stretch is hidden where no section was measured so near: letters and specks are shorter
-_CORNER_WIDTHS = 0.5  # widths; so far aside of the cable a corner of its mask lies at most
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
-_LEAST_BALANCE = 0.8
-"""Of both edges in a section (1: they count alike) for its width to tell how long errors last: one edge then has four
-times the other's variance.
-"""
 
 
 @dataclass(frozen=True)
@@ -61,9 +50,6 @@ class Followed:
 
     Attributes
     ----------
-    rough : RoughCable
-    chord : ChordFrame
-    sections : Sections
     width : (n,) m
         Of the cable on the sections.
     fit : CurveFit
@@ -93,7 +79,8 @@ class Followed:
 
     def half_widths(self) -> HalfWidths:
         """Half the width along the sections that live on both edges: errors of the midline without its bend."""
-        used = (self.fit.weight > 0.0) & (self.sections.balance > _LEAST_BALANCE)
+        # at a balance of 0.8 one edge has four times the other's variance
+        used = (self.fit.weight > 0.0) & (self.sections.balance > 0.8)
         half = 0.5 * (self.sections.balance * (self.width - median(self.width)))[used]
         if self.sections.waves:
             half *= min(1.0, scatter(self.fit.residual[used], 0.0) / scatter(half, 0.0))
@@ -101,8 +88,7 @@ class Followed:
 
     def without(self, wiggle: Array, *, spare: float, lay_std: float) -> Followed:
         """The cable fitted anew, its sections moved back along their normals by ``wiggle`` (n,) m; see `Wiggle`."""
-        theta = self.fit.curve.at(self.fit.s)[1]
-        moved = wiggle[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
+        moved = wiggle[:, None] * normals(self.fit.curve.at(self.fit.s)[1])
         fit = _fit(self.sections, self.chord, self.width, moved=moved)
         noise = np.sqrt(spare)
         fit = replace(fit, smooth=replace(fit.smooth, root=noise * fit.smooth.root, sigma=noise * fit.smooth.sigma))
@@ -111,9 +97,9 @@ class Followed:
 
     def loosened(self, left: float, right: float) -> Followed:
         """The cable with axes whose standard deviations (px) are so large at least."""
-        axes = ((self.rough.left, left), (self.rough.right, right))
-        wider = [replace(axis, std_px=max(axis.std_px, std)) for axis, std in axes]
-        rough = replace(self.rough, left=wider[0], right=wider[1])
+        one, other = self.rough.axes
+        one, other = replace(one, std_px=max(one.std_px, left)), replace(other, std_px=max(other.std_px, right))
+        rough = replace(self.rough, left=one, right=other)
         return replace(self, rough=rough, chord=chord_frame(rough, self.chord.plane, self.chord.axis_parallax_std))
 
     @property
@@ -169,7 +155,8 @@ def _in_its_colours(
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
     fit = _fit(sections, chord, width)
     feet, misses = feet_of_axes(fit, chord)
-    if not chord.marked and misses.max() < _CORNER_WIDTHS * middle_width(width)[0]:
+    # a corner of its mask lies half a width aside of the cable at most
+    if not chord.marked and misses.max() < 0.5 * middle_width(width)[0]:
         rough = _with_ends(rough, chord.to_pixels(fit.curve.at(feet)[0]))
         chord = chord_frame(rough, plane, axis_parallax_std)
         fit = _fit(sections, chord, width)
@@ -193,11 +180,9 @@ def _doubted(cable: Followed) -> Followed:
         return cable
     expected = np.diag(sight.covariance + told_alone(sight).covariance)
     beyond = np.sqrt(np.maximum(sight.miss**2 - expected, 0.0)) / median(cable.width / cable.sections.width)
-    pairs = zip(cable.rough.axes, beyond, strict=True)
-    left, right = (float(off) if axis.kind == "cover" and not axis.sure else 0.0 for axis, off in pairs)
-    return cable.loosened(
-        float(np.hypot(cable.rough.left.std_px, left)), float(np.hypot(cable.rough.right.std_px, right))
-    )
+    doubted = [axis.kind == "cover" and not axis.sure for axis in cable.rough.axes]
+    left, right = np.hypot([axis.std_px for axis in cable.rough.axes], np.where(doubted, beyond, 0.0)).tolist()
+    return cable.loosened(left, right)
 
 
 def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
@@ -218,10 +203,10 @@ def _fit(sections: Sections, chord: ChordFrame, width: Array, *, moved: Array | 
 
 def waves_of(cables: Sequence[Followed | Rejected]) -> Waves:
     """The waves that ground and camera make in the midlines of all photos of a series."""
-    halves = [cable.half_widths() for cable in cables if isinstance(cable, Followed)]
-    scales = [median(cable.width / cable.sections.width) for cable in cables if isinstance(cable, Followed)]
-    lay = max((cable.lay_std for cable in cables if isinstance(cable, Followed)), default=0.0)
-    return edge_waves(halves, metres_per_px=max(scales, default=0.0), lay=lay)
+    followed = [cable for cable in cables if isinstance(cable, Followed)]
+    metres = max((median(cable.width / cable.sections.width) for cable in followed), default=0.0)
+    lay = max((cable.lay_std for cable in followed), default=0.0)
+    return edge_waves([cable.half_widths() for cable in followed], metres_per_px=metres, lay=lay)
 
 
 def centerline_of(
@@ -234,8 +219,6 @@ def centerline_of(
 
     Parameters
     ----------
-    followed : Followed
-    settings : VisionSettings
     told : AxesTold, optional
         What the other photos of its series tell of how the cable passes the axes.
     waves : Waves, optional
@@ -311,8 +294,8 @@ def _shape(
     where, theta = fit.curve.at(s)
     normal, turn, bend = fit.curve.bases(s)
     used = fit.weight > 0.0
-    # s is seen where a section was measured so near, or their usual distance
-    reach = max(median(np.diff(fit.s)), _HIDDEN_WIDTHS * width)
+    # s is seen where a section was measured so near, or their usual distance: letters and specks are shorter
+    reach = max(median(np.diff(fit.s)), 0.5 * width)
     return MeasuredShape(
         s=s - s[0],
         x=where[:, 0],

@@ -35,9 +35,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_opening, maximum_filter1d, median_filter
 
 from pipeline.records import Array
-from pipeline.vision.centerline.curvature import PlaneCurve
+from pipeline.vision.centerline.curvature import PlaneCurve, normals
 from pipeline.vision.centerline.edge_profile import Profiles, fit_edges, fit_profiles, in_one_light
-from pipeline.vision.centerline.edges import Found, edge_pixels, normals
+from pipeline.vision.centerline.edges import Found, edge_pixels
 from pipeline.vision.median import MAD_TO_STD, median, medians, quantile, scatter
 from pipeline.vision.photo import Closeup
 
@@ -259,9 +259,8 @@ def _consistent(
     for side, other in ((0, 1), (1, 0)):
         lost = ~good[:, side] & good[:, other]
         out[lost, side] = local[lost, side] + together * (filled - local)[lost, other]
-        spread[lost, side] = (
-            2.0 * std[lost, other]
-        )  # the same error again, with the other sign: midpoint moves by all of it
+        # the same error again, with the other sign: midpoint moves by all of it
+        spread[lost, side] = 2.0 * std[lost, other]
     if together > 0.0:  # where wires cross, the one in front may stand out more, but the outline has a corner
         spread = np.maximum(spread, medians(spread, axis=0))
     return out, spread, good

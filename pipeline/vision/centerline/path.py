@@ -6,15 +6,9 @@ import numpy as np
 
 from pipeline.messages import Message
 from pipeline.records import Array, Rejected
-from pipeline.vision.centerline.curvature import Frame, PlaneCurve, make_frame
+from pipeline.vision.centerline.curvature import Frame, PlaneCurve, make_frame, normals
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
-from pipeline.vision.centerline.edges import (
-    SEARCH_RADII,
-    Found,
-    in_picture,
-    normals,
-    search_edges,
-)
+from pipeline.vision.centerline.edges import SEARCH_RADII, Found, in_picture, search_edges
 from pipeline.vision.centerline.midline import (
     EDGE_WINDOW_BLURS,
     LEAST_SECTIONS,
@@ -33,45 +27,27 @@ _COVER_CHECK_RADII = 0.6
 """Of the radius; a section counts where it is free of covers that far out on both sides: inside the edges' windows."""
 _LEAST_SEEN_RADII = 10.0  # of the radius; a shorter seen piece is no measurement
 _SOFTER = 1.5  # ratio; edges so much softer than they were taken for reach beyond their windows by a tail of 5 %
-_SECTION_SPACING_DIAMETERS = 0.6
-"""Diameters; sections closer than that tell the same of kappa, see knot_spacing_diameters."""
-_MIN_SECTIONS = 240  # of a short cable; fewer would average over bends, their errors are nearly independent
-_MAX_SECTIONS = 1000  # of a long cable; bounds the time of the fit
-_KNOT_SPACING_DIAMETERS = 1.5  # diameters; a cable cannot bend more sharply than over its own width
-_MIN_INTERVALS = 16  # knot intervals; fewer bias kappa at mid-span above 0.05 %
-_PATH_KNOT_DIAMETERS = 5.0  # diameters; knots of the path that the edges are sought along
-_MOST_INTERVALS = 120  # knot intervals; bounds the time, and of more of them a gap among the points makes a bad start
-_SEARCHES = 3  # at most, each along what the one before found: a path half a width astray is back after two
-_LONGEST_CORRELATION_DIAMETERS = 2.0
-"""Diameters; bound of the errors' correlation length, longer ones cannot be told from a bend."""
 
 
-def fit_along(
-    points: Array,
-    std: Array,
-    *,
-    s: Array,
-    length: float,
-    diameter: float,
-) -> CurveFit:
+def fit_along(points: Array, std: Array, *, s: Array, length: float, diameter: float) -> CurveFit:
     """Curve from axis to axis through points along it: the penalty decides, not the knots.
 
     Parameters
     ----------
-    points : (n, 2)
-    std : (n,)
+    points, std : (n, 2), (n,)
     s : (n,)
         About the arc lengths of the points from the left axis.
     length, diameter : float
         From axis to axis, and of the cable; one unit with the points.
     """
-    start = initial_curve(points, s, _frame(length, _KNOT_SPACING_DIAMETERS * diameter))
-    return fit_curve(points, std, start=start, s=s, longest=_LONGEST_CORRELATION_DIAMETERS * diameter)
+    # A cable cannot bend more sharply than over its own width; errors longer than two cannot be told from a bend.
+    start = initial_curve(points, s, _frame(length, 1.5 * diameter))
+    return fit_curve(points, std, start=start, s=s, longest=2.0 * diameter)
 
 
 def _frame(length: float, spacing: float) -> Frame:
-    intervals = int(np.clip(length / spacing, _MIN_INTERVALS, _MOST_INTERVALS))
-    return make_frame(length, intervals=intervals)
+    # Fewer intervals bias kappa at mid-span above 0.05 %; with more a gap among the points makes a bad start.
+    return make_frame(length, intervals=int(np.clip(length / spacing, 16, 120)))
 
 
 def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | None = None) -> Sections | Rejected:
@@ -93,7 +69,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
         return _lost(rough, 0.0)  # too few points to start a curve from
     thin = max(1, round(0.5 * half_width / (along[-1] / (len(along) - 1))))
     points, s = rough.path_px[first : last + 1 : thin], along[first : last + 1 : thin]
-    frame = _frame(float(along[-1]), _PATH_KNOT_DIAMETERS * 2.0 * half_width)
+    frame = _frame(float(along[-1]), 10.0 * half_width)
     path = follow_points(points, start=initial_curve(points, s, frame), s=s)
     covers = _covers(rough, blur or 0.0)
     margin = [_BLOCK * half_width * (b.kind == "given" and b.radius_px is None) for b in rough.axes]
@@ -101,7 +77,7 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     if span is None:
         return _lost(rough, 0.0)
     tolerance = WIDTH_OFF * (1.0 if known else 2.0)  # a mask's width is known half as well
-    for _ in range(_SEARCHES):
+    for _ in range(3):  # a path half a width astray is back after two
         found = search_edges(closeup, path, span=span, half_width=half_width, tolerance=tolerance)
         width = found.edges[:, 1] - found.edges[:, 0]
         middle = median(width[found.usable]) if found.usable.any() else np.nan
@@ -122,8 +98,10 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
         blur = median(edge_spreads(rough.grey, where - closeup.origin_px, normals(angle), middle))
     found = Found(found.s, ((edges - where[:, None]) * normals(angle)[:, None]).sum(axis=2), usable)
     covers = _covers(rough, blur)
-    count = round((span[1] - span[0]) / (_SECTION_SPACING_DIAMETERS * diameter))
-    count = min(max(count, _MIN_SECTIONS), _MAX_SECTIONS, int(span[1] - span[0]))
+    # Sections closer than 0.6 diameters tell the same of kappa; on a short cable fewer would average over bends, on a
+    # long one more take time.
+    count = round((span[1] - span[0]) / (0.6 * diameter))
+    count = min(max(count, 240), 1000, int(span[1] - span[0]))
     s = span[0] + (np.arange(count) + 0.5) * (span[1] - span[0]) / count
     s = s[
         free_of_covers(path, s, _COVER_CHECK_RADII * half_width, covers)

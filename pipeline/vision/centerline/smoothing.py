@@ -27,8 +27,6 @@ from scipy.linalg import solve_triangular
 from pipeline.records import Array
 from pipeline.vision.median import median
 
-_GRID = 97  # weights tried, over all that can matter: steps of a factor of about two, likelihoods vary over decades
-_LENGTHS = 7  # correlation lengths tried: leaves 0.02 of Fisher's z, a third of what 240 points tell
 _FLOOR = 1e-14  # squared generalised singular values below it are unseen by the data
 
 
@@ -118,9 +116,9 @@ class _Diagonal:
         return np.asarray(self.gamma2 + np.multiply.outer(weight, 1.0 - self.gamma2))
 
     def weights(self) -> Array:
-        """Weights (w,) of the penalty over all that can matter."""
+        """Weights (w,) of the penalty over all decades that can matter, by factors of about two."""
         ratio = np.sort(np.maximum(self.gamma2, _FLOOR) / np.maximum(1.0 - self.gamma2, _FLOOR))[: -self.null]
-        return np.exp(np.linspace(np.log(0.1 * ratio[0]), np.log(1e3 * ratio[-1]), _GRID))
+        return np.exp(np.linspace(np.log(0.1 * ratio[0]), np.log(1e3 * ratio[-1]), 97))
 
     def criterion(self, weights: Array) -> tuple[Array, Array]:
         """Restricted likelihood, -2 log, and sigma squared at every weight, (w,) each."""
@@ -211,7 +209,7 @@ class Problem:
         shortest = 0.2 * gap
         # Even in Fisher's z of neighbours, by which likelihoods of correlations are nearly parabolas.
         low, high = (np.arctanh(np.exp(-gap / length)) for length in (shortest, max(longest, 2.0 * shortest)))
-        tried = np.linspace(low, high, _LENGTHS)
+        tried = np.linspace(low, high, 7)  # leaves 0.02 of z, a third of what 240 points tell
         lengths = -gap / np.log(np.tanh(tried))
         diagonals = [self._diagonal(float(length)) for length in lengths]
         alone = np.array([diagonal.criterion(diagonal.weights())[0].min() for diagonal in diagonals])

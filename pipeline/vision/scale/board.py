@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from pipeline.errors import InputError
 from pipeline.messages import Message
 from pipeline.records import Array, Board, CameraSpec, Finding, Rejected, Scale, doubtful, inferred
-from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.settings.vision import CalibrationSettings, VisionSettings
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.scale.calibration import Calibration
 from pipeline.vision.scale.corners import refine_corners
@@ -37,7 +36,6 @@ _DICTIONARIES = (
     cv2.aruco.DICT_ARUCO_ORIGINAL,
 )
 _BOARD_STD = 3e-4  # relative; a printed board measured with a ruler: 0.1 mm on 300 mm
-_BOARD_SEARCH_PX = 2000  # px; long side at which the board is searched, corners are refined at full resolution
 MAX_BORDER_STD = 0.002  # relative, scale at the border against the middle; curvature is off by half of it, 0.1 %
 _MAX_BOARD_RMS_PX = 0.5  # px; real boards reach 0.12 to 0.16 px, bent ones do not
 
@@ -108,12 +106,11 @@ def _read_views(folder: Path, board: Board, settings: VisionSettings) -> tuple[l
 def find_board(photo: Photo, board: Board) -> BoardView | Rejected:
     """Corners of the board on a photo, sub-pixel; rejected with ``calibration/no-corners`` if it is not there."""
     grey = cv2.convertScaleAbs(_grey(photo), alpha=255.0 / photo.full_scale)
-    factor = max(1, round(max(photo.size) / _BOARD_SEARCH_PX))
+    factor = max(1, round(max(photo.size) / 2000.0))  # px; corners are refined at full resolution
     reduced = cv2.resize(grey, None, fx=1.0 / factor, fy=1.0 / factor, interpolation=cv2.INTER_AREA)
     small = np.asarray(reduced, np.uint8)
     found = _charuco(small, board) if board.charuco else _chessboard(small, board)
-    said = Message("calibration/no-corners", columns=board.columns, rows=board.rows)
-    missing = Rejected(photo.name, said)
+    missing = Rejected(photo.name, Message("calibration/no-corners", columns=board.columns, rows=board.rows))
     if found is None or not _tells_plane(found[0], board):
         return missing
     points, uv = found

@@ -18,12 +18,12 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.messages import Message
 from pipeline.records import Array, Centerline, Finding, Scale, Specimen, inferred
-from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.settings.vision import CalibrationSettings
 from pipeline.vision.median import SURE_SIGMAS
+from pipeline.vision.polyline import step_lengths
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.plane import PlaneMap
 
-_LENGTH = Message("scale.length")
 _MAX_SCALE_STD = 0.01  # relative; a source of scale worse than that is no better than the cable's length
 _COVER_DIAMETER_STD = 0.004  # relative; 0.05 mm on 12 mm: how well a turned cover is known and its rim is lit
 _COVER_HEIGHT_M = 1e-3  # m; top of a cover or marker above the cable's upper side: a lid and its screw
@@ -36,10 +36,8 @@ class Calibration:
 
     Attributes
     ----------
-    plane : PlaneMap
     scale : Scale
         In the middle of the picture; its standard deviation is all of it.
-    findings : tuple of Finding
     uniform_std : relative
         Part of that standard deviation which is the same everywhere: what ``aside`` does not hold.
     aside : tuple of PlaneMap
@@ -66,7 +64,6 @@ def from_found(
 
     Parameters
     ----------
-    specimen : Specimen
     found : list of RoughCable
         At least one.
     displacements : (n,) m
@@ -77,22 +74,13 @@ def from_found(
     Calibration or None
         None without any photo.
     """
-    if not found:
-        return None
-    parallax_std = axis_parallax_std(specimen, found, settings)
     pixels = PlaneMap.from_scale(1.0)
-    estimates = [_by_travel(found, displacements, parallax_std, pixels), _by_covers(found, specimen, settings)]
-    known = [estimate for estimate in estimates if estimate is not None]
-    precise = [scale for scale in known if scale.std_relative < _MAX_SCALE_STD]
-    if precise:
-        scale = min(precise, key=lambda estimate: estimate.std_relative)
-    else:
-        lengths = np.array([cable.length_px for cable in found])
-        scale = Scale(
-            float(np.median(lengths)) / specimen.length_m,
-            settings.length_scale_std,
-            _LENGTH,
-        )
+    by_length = _by_length(pixels, found, specimen, settings)
+    if by_length is None:
+        return None
+    others = (_by_travel(pixels, found, displacements, specimen, settings), _by_covers(found, specimen, settings))
+    precise = [scale for scale in others if scale is not None and scale.std_relative < _MAX_SCALE_STD]
+    scale = min(precise, key=lambda estimate: estimate.std_relative, default=by_length)
     finding = inferred("scale/source", px_per_mm=scale.px_per_m / 1e3, source=scale.source)
     return Calibration(PlaneMap.from_scale(scale.px_per_m), scale, (finding,), scale.std_relative)
 
@@ -109,10 +97,12 @@ def axis_parallax_std(specimen: Specimen, found: list[RoughCable], settings: Cal
     return height / (specimen.camera.distance_m or settings.usual_distance_m)
 
 
-def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: float, plane: PlaneMap) -> Scale | None:
+def _by_travel(
+    plane: PlaneMap, found: list[RoughCable], displacements: Array, specimen: Specimen, settings: CalibrationSettings
+) -> Scale | None:
     """Regression of the chord on the displacement: each metre of travel shortens it by one.
 
-    With chords on a ``plane``, in units of its scale. None without travel, and of axes that a person gave: those on
+    With chords on a plane, in units of its scale. None without travel, and of axes that a person gave: those on
     later photos are where log and scale put them.
     """
     if any(axis.kind == "given" for cable in found for axis in cable.axes):
@@ -132,6 +122,7 @@ def _by_travel(found: list[RoughCable], displacements: Array, parallax_std: floa
     free = len(chords) - 2
     spread = float(np.median(axis_std) / np.median(plane.local_scale(axes)))
     spread = max(spread, float(np.sqrt(residual @ residual / free)) if free > 0 else 0.0)
+    parallax_std = axis_parallax_std(specimen, found, settings)
     std_relative = float(np.hypot(spread / float(np.sqrt(travel @ travel)) / slope, parallax_std))
     return Scale(slope, std_relative, Message("scale.travel"))
 
@@ -160,10 +151,10 @@ def in_plane_of_cable(
 
     Where others do nearly as well, what they differ by is in the scale's standard deviation.
     """
-    parallax_std, misfits = axis_parallax_std(specimen, found, settings), []
+    misfits = []
     for one in planes:
-        travel = _by_travel(found, displacements, parallax_std, one.plane)
-        seen = (travel, _by_length(one, found, specimen, settings))
+        travel = _by_travel(one.plane, found, displacements, specimen, settings)
+        seen = (travel, _by_length(one.plane, found, specimen, settings))
         misfits.append(sum(((s.px_per_m - 1.0) / _std(s, one.scale)) ** 2 for s in seen if s is not None))
     chance = np.exp(-0.5 * (np.array(misfits) - min(misfits)))
     best = planes[int(np.argmax(chance))]
@@ -186,8 +177,7 @@ def check_scale(
     cable could tell such a difference and confirm the scale, it is the covers that are otherwise, not the scale.
     """
     found_by = calibration.scale
-    parallax_std = axis_parallax_std(specimen, found, settings)
-    travel = _by_travel(found, displacements, parallax_std, calibration.plane)
+    travel = _by_travel(calibration.plane, found, displacements, specimen, settings)
     covers = _by_covers(found, specimen, settings)
     if covers is not None:  # in units of the scale used
         axes = np.array([axis.center_px for cable in found for axis in cable.axes])
@@ -196,7 +186,7 @@ def check_scale(
     if covers is not None and covers.source != found_by.source and _off(covers, found_by):
         witnesses = [
             witness
-            for witness in (travel, _by_length(calibration, found, specimen, settings))
+            for witness in (travel, _by_length(calibration.plane, found, specimen, settings))
             if witness is not None
             and witness.source != found_by.source
             and abs(covers.px_per_m - 1.0) > SURE_SIGMAS * _std(witness, found_by)
@@ -227,14 +217,13 @@ def _away(other: Scale, used: Scale) -> Message:
 
 
 def _by_length(
-    calibration: Calibration, found: list[RoughCable], specimen: Specimen, settings: CalibrationSettings
+    plane: PlaneMap, found: list[RoughCable], specimen: Specimen, settings: CalibrationSettings
 ) -> Scale | None:
-    """Scale by the length of the cable in units of the one used."""
+    """Scale by the length of the cable on a plane, in units of its scale; None without any cable."""
     if not found:
         return None
-    paths = (calibration.plane.to_plane(cable.path_px) for cable in found)
-    length = float(np.median([np.sum(np.hypot(*np.diff(path, axis=0).T)) for path in paths]))
-    return Scale(length / specimen.length_m, settings.length_scale_std, _LENGTH)
+    length = float(np.median([step_lengths(plane.to_plane(cable.path_px)).sum() for cable in found]))
+    return Scale(length / specimen.length_m, settings.length_scale_std, Message("scale.length"))
 
 
 def with_doubt_of_plane(line: Centerline, calibration: Calibration) -> Centerline:

@@ -22,11 +22,9 @@ from scipy.special import erf
 
 from pipeline.records import Array
 
-_CORNER_FTOL = 1e-4  # of the squared misfit; what a further step would gain is a hundredth of what noise leaves
 _CORNER_REACH = 0.4  # squares; how far from a corner its edges are fitted: before the next corner's
 _CORNER_MARGIN = 0.9  # share of the white margin beside a ChArUco marker; the rest is the marker's blur
 _CORNER_REACH_PX = 20.0  # px; longer edges hardly help, and a lens bends them: 1 % of barrel by 0.005 px over 20 px
-_CORNER_PIXELS = 36  # pixels; nine unknowns of a corner, each from four
 _CORNER_BLUR_PX = 1.5  # px; blur at the start, wide enough to reach the edge from a pixel
 _CORNER_CONTRAST = 2.0  # half the step from black to white over the rms that the fit leaves; noise of 10 % has 4
 _CORNER_MOVE = 0.15  # squares; a corner found farther from its start is another thing
@@ -58,7 +56,7 @@ def refine_corners(grey: Array, uv: Array, cells: Array, marker_share: float = 0
 def _refined(grey: Array, start: Array, cell: Array, margin: float) -> Array:
     lost = np.full(2, np.nan)
     place, value = _pixels(grey, start, cell, margin)
-    if len(value) < _CORNER_PIXELS:
+    if len(value) < 36:  # nine unknowns of a corner, each from four pixels
         return lost
 
     def fitted(x: Array) -> tuple[Array, float]:
@@ -73,7 +71,8 @@ def _refined(grey: Array, start: Array, cell: Array, margin: float) -> Array:
         return fitted(x)[0]
 
     guess = np.array([*start, *np.arctan2(cell[1], cell[0]), np.log(_CORNER_BLUR_PX)])
-    fit = least_squares(misfit, guess, method="lm", ftol=_CORNER_FTOL)
+    # what a further step would gain is a hundredth of what noise leaves
+    fit = least_squares(misfit, guess, method="lm", ftol=1e-4)
     left, step = fitted(fit.x)
     square = float(np.hypot(*cell).min())
     clear = abs(step) > _CORNER_CONTRAST * float(np.std(left))

@@ -61,7 +61,6 @@ class PlaneMap:
     ----------
     homography : (3, 3)
         From undistorted pixels to the plane in m.
-    lens : Lens or None
     """
 
     homography: Array
@@ -104,7 +103,6 @@ class ChordFrame:
 
     Attributes
     ----------
-    plane : PlaneMap
     origin : (2,) m
         Left bearing axis on the plane.
     rotation : (2, 2)
@@ -149,8 +147,7 @@ def chord_frame(rough: RoughCable, plane: PlaneMap, axis_parallax_std: float = 0
     chord = float(np.hypot(*(right - left)))
     along = (right - left) / chord
     across = np.array([-along[1], along[0]])
-    first, last = rough.visible
-    bow = float(np.mean((plane.to_plane(rough.path_px[first : last + 1]) - left) @ across))
+    bow = float(np.mean((plane.to_plane(rough.seen_px) - left) @ across))
     toward = across if bow >= 0.0 else -across
     std = np.hypot(rough.left.std_px, rough.right.std_px) / np.sqrt(2.0)
     return ChordFrame(

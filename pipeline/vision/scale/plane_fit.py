@@ -25,7 +25,6 @@ from pipeline.vision.scale.plane import Lens, PlaneMap, project
 
 USUAL_LENS = 0.02  # relative; standard deviation of k1 at half the diagonal among lenses nobody corrected
 _LEAST_STD_PX = 1e-3  # px; of corners: a tenth of what noise leaves at best
-_LENS_PHOTOS = 3  # photos; so many positions tell a lens, two leave its focal lengths and middle open (Zhang, 2000)
 _DISTANCE_STD = 0.3  # relative; a distance known worse tells no more than a usual one
 _CORNER_STD_PX = 0.15  # px; corners of real boards off the plane, before they are fitted
 _ONE_PLANE_RATIO = 1.5  # ratio of the corners' rms in one plane to that in free positions; tilts of a degree double it
@@ -47,7 +46,6 @@ class PlaneFit:
 
     Attributes
     ----------
-    plane : PlaneMap
     rms_px : float px
         Of the corners off the fit.
     scale_std, border_std : float
@@ -55,7 +53,6 @@ class PlaneFit:
         border.
     distance_m : float or None
         Of the camera, if the photos tell.
-    lens_source : Message
     aside : tuple of PlaneMap
         Maps one standard deviation away along each principal direction of the fit's covariance.
     photo : str
@@ -75,7 +72,7 @@ class PlaneFit:
 def fit_views(views: list[BoardView]) -> list[PlaneFit]:
     """Plane maps of the board's surface from one photo or more: one for all, or that of each photo."""
     flat = _fit_plane_views(views)
-    if len(views) < _LENS_PHOTOS:
+    if len(views) < 3:  # two positions leave focal lengths and middle of a lens open (Zhang, 2000)
         return [flat]
     free = _fit_free_views(views)
     # Photos that all show the board in one plane fit there as well, and tell no focal length: any lens would do.
@@ -147,7 +144,7 @@ def _picture(view: BoardView) -> tuple[Array, float]:
 
 @dataclass(frozen=True)
 class _Solution:
-    """Parameters ``x``, their covariance in units of ``unit``, rms of the residuals in px and their number."""
+    """Parameters ``x``, their covariance in units of ``unit``, rms of the residuals in px."""
 
     x: Array
     unit: Array

@@ -14,6 +14,7 @@ Units: grey values are fractions of full range; pixels of the reduced photo are 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -28,13 +29,9 @@ from pipeline.vision.photo import Photo, reduce_area
 Image = NDArray[np.float32]
 CELLS_ACROSS = 8.0  # cells across a cable of known diameter in the reduced photo: a highlight of a fifth is still one
 MIN_GROUND_STD = 0.002  # of full range; half a level of 8 bits: no ground is calmer than its rounding
-_HIGHER_LEVELS = 2  # levels above Otsu's, each splits what stands above the last: shadow, then cable
-_REDUCED_SIDE_CELLS = 1000
-"""Cells; long side of the reduced photo where the diameter is unknown: a skeleton takes 20 ms."""
 _UNEVEN = 0.3  # of the step to the ground; cables of one colour with gloss, print and shade scatter by less
 _STIFF = 0.01  # of the squared step, added to every colour's variance: colours that hardly differ are not chased
 _CORE = 0.45  # of the depth around; cells of a mask nearer to its rim than that are mixed with the ground
-_AROUND = np.ones((9, 9), np.uint8)  # cells
 _SHADE_COSINE, _DARKEST_SHADE = 0.97, 0.5  # of the ground's colour; a lamp leaves half of the light in a shadow
 ROWS = 128  # px; worked on at a time: large photos shall not be held as single precision
 _LEAST_CABLE = 0.25  # of what stands out; with less, its colours are those of shadow or of other things
@@ -88,7 +85,7 @@ class Standout:
         top = float(self.distance.max()) + 1e-9
         coded = (255.0 * np.sqrt(self.distance / np.float32(top))).astype(np.uint8)
         levels: list[float] = []
-        for _ in range(1 + _HIGHER_LEVELS):
+        for _ in range(3):
             code, _ = cv2.threshold(coded, 0, 255, cv2.THRESH_OTSU)
             levels.append(max(float((code + 0.5) / 255.0) ** 2 * top, 1e-9))
             coded = coded[coded > code]
@@ -107,9 +104,8 @@ class Standout:
 
 def choose_reduction(size: tuple[int, int], diameter_px: float | None) -> int:
     """Photo pixels per cell: a few cells across the cable if its diameter is known, a set picture size if not."""
-    by_size = max(1, round(max(size) / _REDUCED_SIDE_CELLS))
     if diameter_px is None:
-        return by_size
+        return max(1, round(max(size) / 1000.0))  # a skeleton of so many cells takes 20 ms
     return max(1, int(diameter_px / CELLS_ACROSS))
 
 
@@ -192,12 +188,17 @@ def _cable_and_shadow(standout: Standout) -> tuple[NDArray[np.bool_], NDArray[np
     """Cells ``(h, w)`` in the middle of what stands out, and those of them whose colour is the ground's, dimmed."""
     mask = (standout.distance > standout.levels[0]).astype(np.uint8)
     depth = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
-    middle = (depth >= _CORE * cv2.dilate(depth, _AROUND)) & (mask > 0)
+    middle = (depth >= _CORE * cv2.dilate(depth, np.ones((9, 9), np.uint8))) & (mask > 0)
     ground = standout.picture - standout.residual
     less, light = -(standout.residual * ground).sum(axis=2), np.linalg.norm(ground, axis=2)
     sizes = np.linalg.norm(standout.residual, axis=2)
     shadow = (less > _SHADE_COSINE * sizes * light) & (sizes < _DARKEST_SHADE * light)
     return middle & ~shadow, middle & shadow
+
+
+def bands(photo: Photo) -> Iterator[slice]:
+    """The rows of a photo, some at a time."""
+    return (slice(first, first + ROWS) for first in range(0, photo.size[1], ROWS))
 
 
 def _along(photo: Photo, core: Array, ground: Array) -> Photo:
@@ -209,6 +210,6 @@ def _along(photo: Photo, core: Array, ground: Array) -> Photo:
     darkest = float(np.minimum(weights, 0.0).sum())
     scaled = (65535.0 / photo.full_scale * weights).astype(np.float32)[None]
     grey = np.empty(photo.pixels.shape[:2], np.uint16)
-    for rows in (slice(first, first + ROWS) for first in range(0, len(grey), ROWS)):
+    for rows in bands(photo):
         grey[rows] = np.rint(cv2.transform(photo.pixels[rows].astype(np.float32), scaled) - 65535.0 * darkest)
     return Photo(photo.name, grey, 16, photo)

@@ -135,8 +135,8 @@ def _alike(standout: Standout, cut: CrossCut, width: float, usual: float) -> NDA
 
 def _weber(standout: Standout, cut: CrossCut, width: float) -> Array:
     """Step of each section by the brightness of its ground."""
-    _, normal = path_normals(cut.path)
-    ground = straightened(standout.picture, cut.path, normal, np.array([-1.2, 1.2]) * width).mean(axis=(1, 2))
+    aside = np.array([-1.2, 1.2]) * width
+    ground = straightened(standout.picture, cut.path, path_normals(cut.path), aside).mean(axis=(1, 2))
     return np.asarray(cut.step / np.maximum(ground, _BEYOND_DARKEST))
 
 
@@ -149,7 +149,6 @@ def more_beyond(
 
     Parameters
     ----------
-    standout : Standout
     cut : CrossCut
         The strip's cross-cuts.
     axes : pair of Bearing

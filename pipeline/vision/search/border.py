@@ -35,11 +35,9 @@ _MOVED = 2.0  # of a usual slope, for each column that a course moves from group
 
 def border_width(photo: Photo, found: RoughCable) -> float | None:
     """Width (px) from border to border of what the strip found is a part of; None if it is the whole of it."""
-    first, last = found.visible
-    middle = found.path_px[first : last + 1]
-    width = 2.0 * found.half_width_px
+    middle, width = found.seen_px, 2.0 * found.half_width_px
     offsets, spacing = _offsets(_GROUND[1], width)
-    across = path_normals(middle)[1]
+    across = path_normals(middle)
     grey = values_at(photo, middle[:, None] + offsets[:, None] * across[:, None]) @ np.array(found.weights, np.float32)
     slope, places = _slopes(grey, 1.0 / spacing), (_OWN, _BESIDE, _GROUND)
     sides = [[_steepest(slope, side * offsets / width, place)[:2] for place in places] for side in (-1.0, 1.0)]
@@ -55,7 +53,6 @@ def soft_beside_sharp(closeup: Closeup, middle: Array, across: Array, width: flo
 
     Parameters
     ----------
-    closeup : Closeup
     middle, across : (n, 2) px, -
         Along the midline as measured, and unit vectors across it.
     width : px

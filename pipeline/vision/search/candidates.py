@@ -30,11 +30,7 @@ from pipeline.vision.search.strips import (
 )
 
 MIN_PARTNER_WIDTHS = 8.0  # widths; an end that meets a strip shorter than that meets a bolt or a letter
-_JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
-_LEVEL_FACTORS = (0.5, 2.0, 0.25)  # ratios to Otsu's level that are tried next: texture may push it up or down
 _MAX_JUDGED_PICTURES = 4  # readings with a long strip that are judged; what four of them refuse is not the cable
-_MAX_COVERED_SHARE = 0.5  # share of the photo; a mask that covers more is ground, not cable
-_MIN_BAND_EDGES = 0.5  # share of sections that show both edges of a cable within a band
 _BAND_WIDTHS = 3.2  # widths; cable and hard shadow together, by a lamp 25 degrees above the table
 
 
@@ -101,14 +97,14 @@ def _pictures(standout: Standout, wanted: Wanted) -> Iterator[tuple[Image, float
 def _levels(standout: Standout) -> list[float]:
     """Levels in ground sigmas, the likeliest first."""
     otsu, *higher = standout.levels
-    others = (*higher, *(factor * otsu for factor in _LEVEL_FACTORS))
-    # lower, noise makes strips
+    # texture may push Otsu's level up or down; below three sigmas noise makes strips
+    others = (*higher, *(factor * otsu for factor in (0.5, 2.0, 0.25)))
     return [otsu, *(level for level in others if level > SURE_SIGMAS)]
 
 
 def _readings(picture: Image, level: float, wanted: Wanted) -> Iterator[Reading]:
     above = picture > level
-    if above.mean() > _MAX_COVERED_SHARE:
+    if above.mean() > 0.5:  # that is ground, not cable
         return
     widths = [(wanted.width, np.inf)] if wanted.width is not None else _guess_widths(above)
     largest = 0.0
@@ -138,8 +134,7 @@ def _read(above: NDArray[np.bool_], width: float, level: float, wanted: Wanted) 
     mask = strip_mask(above, width)
     thick = thick_part(mask, THICK_WIDTHS * width)
     strips = [s for s in find_strips(mask, thick, width) if s.length <= wanted.most_length]
-    joined = join_strips(strips, width, gap=_JOINT_GAP_WIDTHS * width)
-    strips = [strip for strip in joined if strip.length <= wanted.most_length] or strips
+    strips = [strip for strip in join_strips(strips, width) if strip.length <= wanted.most_length] or strips
     if wanted.width is None and strips:
         width = strips[0].width
     return Reading(tuple(strips), mask, thick, width, level)
@@ -165,6 +160,6 @@ def _cable_within(standout: Standout, band: Strip, width: float) -> Strip | None
     if len(path) < MIN_PIECE_WIDTHS * width:
         return None
     cut = cut_across(standout, path, width, known=True, search=0.5 * (_BAND_WIDTHS - 1.0))
-    if len(cut.seen_widths) < _MIN_BAND_EDGES * len(cut.width):
+    if len(cut.seen_widths) < 0.5 * len(cut.width):
         return None
     return replace(band, path=cut.path, width=cut.usual_width)

@@ -15,7 +15,6 @@ from pipeline.vision.median import medians
 from pipeline.vision.photo import Photo, straightened
 from pipeline.vision.search.backdrop import ROWS, Image, Standout
 
-_GROUPS = 8  # of neighbouring sections, on which the edge's spread is measured
 _CORRIDOR_WIDTHS = 2.25  # widths; half corridor kept at full resolution: noise is read up to 1.6 widths away
 
 
@@ -58,10 +57,10 @@ def edge_spreads(grey: Image, middle: Array, across: Array, width: float) -> Arr
     step = 0.25
     offsets = np.arange(-0.4 * width, 0.4 * width + step, step)
     plateau = max(2, len(offsets) // 6)
-    spreads = np.zeros((2, _GROUPS))
+    spreads = np.zeros((2, 8))
     for side, edge in enumerate((-0.5 * width, 0.5 * width)):
         profiles = straightened(grey, middle, across, edge + offsets)[..., 0]
-        for k, group in enumerate(np.array_split(profiles, _GROUPS)):
+        for k, group in enumerate(np.array_split(profiles, spreads.shape[1])):
             profile = medians(group, axis=0)
             height = abs(float(profile[-plateau:].mean() - profile[:plateau].mean()))
             slope = float(np.abs(profile[2:] - profile[:-2])[plateau - 1 : 1 - plateau].max(initial=0.0)) / (2.0 * step)

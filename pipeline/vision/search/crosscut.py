@@ -40,7 +40,6 @@ _PAIR_SEARCH_WIDTHS = 0.6  # widths; a shadow as wide as the cable draws the mas
 _PAIR_POOLING_WIDTHS = 1.0  # widths; sections pooled for the pair of edges: letters are shorter, bends longer
 _PAIR_WANDER_COST = 0.5  # usual edges for each column moved; a mask wanders slowly, a jump to a shadow's edge must pay
 _PAIR_WIDTH_RANGE = (0.45, 1.6)  # ratios to the width that are tried: half a cable along a highlight, and a shadow's
-_PAIR_WIDTHS = 26  # widths tried, 5 % apart; the edges are then sought in 15 %
 _PAIR_WIDTH_STD = 0.25  # logarithm; how far a given diameter may be off: scales and sheaths are
 _PAIR_WIDTH_SHARE = 0.9  # ratio to the best pair's score from which a wider pair is preferred
 _EDGE_REACH_WIDTHS = 0.1  # widths; an edge is sought so near to the pair's place; glare is farther
@@ -108,13 +107,13 @@ def smooth_path(path: Array, sigma: float) -> Array:
     return np.asarray(gaussian_filter1d(padded, sigma, axis=0)[pad : pad + len(even)])
 
 
-def path_normals(path: Array) -> tuple[Array, Array]:
-    """Unit tangents and normals ``(k, 2)`` of a path."""
+def path_normals(path: Array) -> Array:
+    """Unit normals ``(k, 2)`` of a path."""
     tangent = np.empty_like(path)
     tangent[1:-1] = 0.5 * (path[2:] - path[:-2])
     tangent[[0, -1]] = path[[1, -1]] - path[[0, -2]]
     tangent /= np.hypot(*tangent.T)[:, None] + 1e-12
-    return tangent, np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    return np.column_stack([-tangent[:, 1], tangent[:, 0]])
 
 
 def cut_across(
@@ -134,7 +133,7 @@ def cut_across(
     of edges one width apart gives middle and width of each section (`find_flanks`).
     """
     path = smooth_path(path, _SMOOTHING_WIDTHS * width)
-    _, normal = path_normals(path)
+    normal = path_normals(path)
     offsets = np.arange(-2.2, 2.2001, 1.0 / max(width, 4.0)) * width
     straight = straightened(standout.residual, path, normal, offsets)
     weights = _projection(straight, offsets / width, standout.covariance) if weights is None else weights
@@ -166,7 +165,7 @@ def crossed_at(standout: Standout, cut: CrossCut) -> tuple[float, float] | None:
     """
     width, each = cut.usual_width, max(1, round(0.25 * cut.usual_width))
     offsets = np.linspace(-_ARM_WIDTHS, _ARM_WIDTHS, 59)
-    straight = straightened(standout.residual, cut.path, path_normals(cut.path)[1], width * offsets)
+    straight = straightened(standout.residual, cut.path, path_normals(cut.path), width * offsets)
     grey = straight @ cut.weights.astype(np.float32)
     count = len(grey) // each
     if count <= 24:
@@ -247,7 +246,6 @@ def find_flanks(
         Evenly spaced.
     width : cells
         The cable's if ``known``, else that of the mask, which a shadow may have widened.
-    known : bool
     search : widths
         How far beside the middle of the picture the pair's middle may lie.
 
@@ -336,7 +334,7 @@ def _pair_width(rise: Array, fall: Array, near: NDArray[np.intp], width: float, 
     Of an unknown width it is the largest of nearly the best: a highlight splits a cable, nothing doubles
     it.
     """
-    tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, _PAIR_WIDTHS)
+    tried = width * np.geomspace(*_PAIR_WIDTH_RANGE, 26)  # 5 % apart; the edges are then sought in 15 %
     rise, fall = (edge[:: max(1, len(edge) // 300)] for edge in (rise, fall))  # 300 sections tell a width
     totals = _reached(_pair_score(rise, fall, near, tried), _PAIR_WANDER_COST)[-1].max(axis=1) / len(rise)
     if known:

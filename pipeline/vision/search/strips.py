@@ -28,11 +28,7 @@ MIN_PIECE_WIDTHS = 2.5  # widths; shorter pieces are writing, dirt or texture, b
 WIDTH_RATIO_RANGE = (0.5, THICK_WIDTHS)
 """To the diameter; mask widths of a cable with shadow or with a rim lost in glare, and of another that is as likely."""
 JOINT_ANGLE_DEG = 30.0  # degrees; over five widths a cable turns by less unless its bend radius is ten widths
-_LARGE_DISC = 31  # cells; an opening by a disc takes longer than two distance transforms from here on
-_CLOSING_WIDTHS = 0.45  # widths; gaps closed in the mask: a highlight takes up to a third of the width
-_OPENING_WIDTHS = 0.3  # widths; specks removed: texture is finer than the cable
-_MAX_PIECES = 12  # largest pieces of a mask that are traced; the cable is among them
-_MAX_WIDTH_GUESSES = 3  # widths tried where the diameter is unknown; 1 was right so far
+_JOINT_GAP_WIDTHS = 5.0  # widths; a sticker, glare or crossing interrupts the mask by a few widths
 
 
 @dataclass(frozen=True)
@@ -58,7 +54,8 @@ class Strip:
 
 def strip_mask(above: NDArray[np.bool_], width: float) -> Mask:
     """Mask of what stands out, closed over highlights and filled where writing leaves holes."""
-    mask = _morphology(above.astype(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSING_WIDTHS * width))
+    # A highlight takes up to a third of the width.
+    mask = _morphology(above.astype(np.uint8), cv2.MORPH_CLOSE, _disc(0.45 * width))
     contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     small = [
         contour
@@ -67,7 +64,7 @@ def strip_mask(above: NDArray[np.bool_], width: float) -> Mask:
     ]
     cv2.drawContours(mask, small, -1, 1, cv2.FILLED)
     # Specks of noise and texture are thinner than any cable.
-    return _morphology(mask, cv2.MORPH_OPEN, _disc(_OPENING_WIDTHS * width))
+    return _morphology(mask, cv2.MORPH_OPEN, _disc(0.3 * width))
 
 
 def drawn_path(path: Array, width: float, shape: tuple[int, ...]) -> Mask:
@@ -80,9 +77,9 @@ def drawn_path(path: Array, width: float, shape: tuple[int, ...]) -> Mask:
 def thick_part(mask: Mask, least: float) -> Mask:
     """Things at least so many cells wide: clamps, covers, the holder."""
     disc = _disc(least)
-    if len(disc) <= _LARGE_DISC:
+    if len(disc) <= 31:
         return _morphology(mask, cv2.MORPH_OPEN, disc)
-    # the same by distances, whose time does not grow with the disc
+    # the same by distances, whose time does not grow with the disc: less from here on
     radius = len(disc) // 2
     core = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > radius
     if not core.any():
@@ -97,7 +94,7 @@ def find_strips(mask: Mask, thick: Mask, width: float, *, most: float = THICK_WI
     thin = mask & (1 - grown)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
-    largest = 1 + np.argsort(areas)[::-1][:_MAX_PIECES]
+    largest = 1 + np.argsort(areas)[::-1][:12]  # the cable is among them
     strips = []
     for label in largest[areas[largest - 1] >= MIN_PIECE_WIDTHS * width**2]:
         u, v, w, h = stats[label, :4]
@@ -121,24 +118,22 @@ def ridge_widths(mask: Mask) -> list[tuple[float, float]]:
     # A ridge is up to as thick as the strip's cells allow; neighbouring bins belong to the same strip.
     pooled = np.convolve(counts, [0.5, 1.0, 0.5], mode="same")
     order = [i for i in np.argsort(pooled)[::-1] if pooled[i] >= max(pooled[max(i - 1, 0) : i + 2])]
-    best = [i for i in order[:_MAX_WIDTH_GUESSES] if pooled[i] > 0]
+    best = [i for i in order[:3] if pooled[i] > 0]  # the first was right so far
     return [(float(np.sqrt(edges[i] * edges[i + 1])), float(pooled[i])) for i in best]
 
 
-def join_strips(strips: list[Strip], width: float, *, gap: float) -> list[Strip]:
-    """Join strips whose ends face each other across a gap (glare, a sticker) up to ``gap``."""
+def join_strips(strips: list[Strip], width: float) -> list[Strip]:
+    """Join strips whose ends face each other across a gap."""
     strips = list(strips)
     while True:
-        best = _best_joint(strips, width, gap)
+        best = _best_joint(strips, width)
         if best is None:
             return sorted(strips, key=lambda strip: -strip.length)
         i, j, first, second = best
         a, b = strips[i], strips[j]
         share = np.array([a.length, b.length]) / (a.length + b.length)
-        joined = Strip(
-            np.vstack([first, _bridge(first[-1], second[0]), second]),
-            float(share @ (a.width, b.width)),
-        )
+        path = np.vstack([first, _bridge(first[-1], second[0]), second])
+        joined = Strip(path, float(share @ (a.width, b.width)))
         strips = [strip for k, strip in enumerate(strips) if k not in (i, j)] + [joined]
 
 
@@ -148,8 +143,8 @@ def _bridge(start: Array, stop: Array) -> Array:
     return np.linspace(start, stop, count)[1:-1]
 
 
-def _best_joint(strips: list[Strip], width: float, least: float) -> tuple[int, int, Array, Array] | None:
-    best = None
+def _best_joint(strips: list[Strip], width: float) -> tuple[int, int, Array, Array] | None:
+    best, least = None, _JOINT_GAP_WIDTHS * width
     for i, a in enumerate(strips):
         for j in range(i + 1, len(strips)):
             for first in (a.path, a.path[::-1]):

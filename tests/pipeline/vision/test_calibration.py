@@ -10,8 +10,7 @@ import pytest
 from pipeline.errors import InputError
 from pipeline.messages import Message
 from pipeline.records import Board, CameraSpec, LoadStep, Rejected, RigSpec, Scale, Specimen
-from pipeline.settings.vision import VisionSettings
-from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.settings.vision import CalibrationSettings, VisionSettings
 from pipeline.vision.bearings.steady import moved_axes
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, Strand, render_board

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.settings.vision.scale import CalibrationSettings
+from pipeline.settings.vision import CalibrationSettings
 from pipeline.vision.render import Camera, ChessBoard
 from pipeline.vision.render.strand import Curve
 from pipeline.vision.scale.calibration import Calibration, from_number, with_doubt_of_plane

@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from pipeline.vision.centerline.curvature import PlaneCurve, make_frame
+from pipeline.vision.centerline.curvature import PlaneCurve, make_frame, normals
 from pipeline.vision.centerline.edge_profile import Pixels, fit_edges, fit_profiles, profile
-from pipeline.vision.centerline.edges import in_picture, normals, search_edges
+from pipeline.vision.centerline.edges import in_picture, search_edges
 from pipeline.vision.centerline.midline import free_of_covers, measure_sections
 from pipeline.vision.photo import Closeup, straightened
 

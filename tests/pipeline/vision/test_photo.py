@@ -14,7 +14,7 @@ import pytest
 from PIL import Image, ImageOps
 
 from pipeline.records import Rejected
-from pipeline.settings.vision.photo import PhotoSettings
+from pipeline.settings.vision import PhotoSettings
 from pipeline.vision.photo import Photo, decode_photo, load_photo
 
 SETTINGS = PhotoSettings()
@@ -174,7 +174,7 @@ def png_chunks(data: bytes) -> list[tuple[int, bytes, int]]:
 MEASURE = """
 import resource, sys
 from pathlib import Path
-from pipeline.settings.vision.photo import PhotoSettings
+from pipeline.settings.vision import PhotoSettings
 from pipeline.vision.photo import load_photo
 used = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 before = used()

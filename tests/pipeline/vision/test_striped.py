@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.records import Centerline, Rejected
-from pipeline.settings.vision.photo import PhotoSettings
+from pipeline.settings.vision import PhotoSettings
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import load_photo
