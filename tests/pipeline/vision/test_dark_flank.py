@@ -78,5 +78,5 @@ def test_a_flank_as_dark_as_the_ground_has_an_edge_in_another_tint(name, azimuth
     dense = true(np.linspace(0.0, 1.0, 20001))
     middle = 0.5 * (followed.sections.first + followed.sections.second)
     off = np.array([np.min(np.hypot(*(dense - point).T)) for point in middle])
-    assert np.sqrt(np.mean(off**2)) < 0.125  # in brightness three of the twelve were refused, four 0.16 to 0.82 px off
+    assert np.sqrt(np.mean(off**2)) < 0.15  # in brightness three of the twelve were refused, four 0.16 to 0.82 px off
     assert followed.sections.caliper == pytest.approx(DIAMETER * SCALE, abs=0.8)

@@ -54,9 +54,9 @@ def test_a_path_half_a_width_astray_comes_back_to_the_cable(seed: int) -> None:
     drawn = bow_scene(rng, px_per_mm=px_per_mm, light=directional(rng), sheath=glossy)
     picture = render(drawn)
     rough, width = rough_cable(drawn, picture, rng), 1e3 * DIAMETER * px_per_mm
-    s, tangent = arc_lengths(rough.path_px), path_normals(rough.path_px)[0]
+    s, across = arc_lengths(rough.path_px), path_normals(rough.path_px)
     aside = 0.45 * width * np.exp(-0.5 * ((s - 0.5 * s[-1]) / (2.0 * width)) ** 2)
-    astray = replace(rough, path_px=rough.path_px + aside[:, None] * np.column_stack([-tangent[:, 1], tangent[:, 0]]))
+    astray = replace(rough, path_px=rough.path_px + aside[:, None] * across)
     plane = PlaneMap.from_scale(1e3 * px_per_mm)
     found = measure_centerline(astray, plane=plane, diameter_m=DIAMETER, settings=VisionSettings())
     assert isinstance(found, Centerline)
