@@ -84,7 +84,7 @@ class RoughCable:
     evidence : Evidence
         For being a cable, along the path.
     rival : RoughCable or None
-        As it is seen in other colours: measured instead, where this one is refused.
+        As it is seen in other colours, or with its ground: measured instead, where this one is refused.
     """
 
     image: str

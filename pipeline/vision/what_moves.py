@@ -19,7 +19,8 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
     """The photos of a series with the cables found without what stands still in it.
 
     Twice: by the colour of what moves in which the farthest photo shows the likeliest cable, then by that of the cables
-    found. A cable that was seen on the same course before, as long, stays as it was found.
+    found. A cable that was seen as long on the same course before stays as it was found, if it was surely one, or as
+    likely.
     """
     usable = {k: shot.size for k, shot in enumerate(shots) if shot.size is not None and not _is_spoilt(shot)}
     alike = [k for k, size in usable.items() if size in dict(Counter(usable.values()).most_common(1))]
@@ -37,15 +38,17 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
     likely = [(cable.evidence.value, k) for k, (cables, _) in enumerate(tried) for cable in cables]
     if not likely:
         return shots
-    first = _searched(search, sought, photos, grounds[max(likely)[1]])
-    middles = [(photo, first[k].path_px[slice(*first[k].visible)]) for k, photo in photos.items() if k in first]
-    rounds = [first]
+    found = _searched(search, sought, photos, grounds[max(likely)[1]])
+    middles = [(photo, found[k].seen_px) for k, photo in photos.items() if k in found]
     if middles:
-        rounds.append(_searched(search, sought, photos, Ground.of(held, colour_along(middles, held[0]))))
-    settled = shots
-    for found in rounds:
-        better = {k: cable for k, cable in found.items() if not _is_same(settled[k].found, cable, most)}
-        settled = [replace(shot, found=better[k]) if k in better else shot for k, shot in enumerate(settled)]
+        for k, cable in _searched(search, sought, photos, Ground.of(held, colour_along(middles, held[0]))).items():
+            found[k] = max(cable, found.get(k, cable), key=lambda one: one.evidence.value)
+    settled = list(shots)
+    for k, cable in found.items():
+        before = shots[k].found
+        if not _as_well(before, cable, most):
+            rival = before if isinstance(before, RoughCable) else None
+            settled[k] = replace(shots[k], found=replace(cable, rival=rival))
     return settled
 
 
@@ -68,8 +71,9 @@ def _is_spoilt(shot: Shot) -> bool:
     return isinstance(shot.found, Rejected) and shot.found.code in ("photo/blank", "photo/blur")
 
 
-def _is_same(old: RoughCable | Rejected, new: RoughCable, most: float) -> bool:
-    """True if it was on the same course before, as long to a relative deviation."""
-    if isinstance(old, Rejected):
+def _as_well(old: RoughCable | Rejected, new: RoughCable, most: float) -> bool:
+    """True if it was seen before, as long to a relative deviation, and surely or as likely as now."""
+    if isinstance(old, Rejected) or not lies_on(old, [new.path_px]):
         return False
-    return lies_on(old, [new.path_px]) and abs(new.length_px / old.length_px - 1.0) <= most
+    sure = old.evidence.clear or old.evidence.value >= new.evidence.value
+    return sure and abs(new.length_px / old.length_px - 1.0) <= most
