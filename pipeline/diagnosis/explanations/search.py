@@ -22,6 +22,7 @@ import numpy as np
 
 from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.unnamed import (
+    LEVER,
     SIZES,
     UNKNOWN,
     UnknownBends,
@@ -220,8 +221,8 @@ class Search:
         known = [base, *(found.found for found in self.posterior.explanations()[:LIKELIEST] if found.found)]
         hopeless = min(one.fitted.chi2 for one in known) + LEAST
         for one in known:
-            about = suspect(bench.observation, one.fitted, BEGUN)
-            loud = (about.best(number) for number in range(len(BEGUN)))
+            about = suspect(bench.observation, one.fitted, (*BEGUN, LEVER))
+            loud = (about.best(number) for number in range(len(about.causes)))
             least = max(SHAPE_GAIN, one.fitted.chi2 - hopeless)
             since = [k for k in loud if k is not None and about.statistic[k] ** 2 > least]
             fits = (fit_term(bench.observation, one.fitted, about, k, hopeless=hopeless) for k in since)

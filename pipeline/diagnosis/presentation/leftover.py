@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.causes.begun import BEGUN
-from pipeline.diagnosis.causes.unnamed import PLACE, POINTS, UNKNOWN
+from pipeline.diagnosis.causes.unnamed import LEVER, PLACE, POINTS, UNKNOWN
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.maps import across_cable
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -50,8 +50,11 @@ def _unnamed(bench: Workbench, fitted: Fit) -> Message | None:
     for k, term in enumerate(fitted.extension.terms):
         if term.cause in UNKNOWN:
             return _unknown(bench, fitted)
+        size = (*fitted.amount(k), term.cause.unit)
+        if term.cause is LEVER:
+            return Message(LEVER.name, side=term.variant.label, size=size)
         if term.cause in BEGUN:
-            step, size = bench.test.steps[int(term.variant.at)], (*fitted.amount(k), term.cause.unit)
+            step = bench.test.steps[int(term.variant.at)]
             more = Message("begun.growing") if term.variant.width else ""
             return Message(term.cause.name, step=step.step, branch=step.branch, size=size, more=more)
     return None

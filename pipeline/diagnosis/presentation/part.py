@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.load_cell import Relaxation, lost_unseen
-from pipeline.diagnosis.causes.unnamed import UnknownForces, UnknownMoments
+from pipeline.diagnosis.causes.unnamed import LEVER, UnknownForces, UnknownMoments
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.heldout import measured_gain
@@ -39,7 +39,7 @@ from rod.inverse.fit import Fit
 BY_CHANCE = ("left.astray", *(cause.name for cause in BEGUN))
 """What is left over that may have come by chance, and need not come again."""
 
-AT_A_PLACE = (UnknownForces.name, UnknownMoments.name)
+AT_A_PLACE = (LEVER.name, UnknownForces.name, UnknownMoments.name)
 """What is left over that is told with the place at which it acts."""
 
 
