@@ -36,11 +36,10 @@ from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.fit import Fit
 
-BY_CHANCE = ("left.astray", *(cause.name for cause in BEGUN))
-"""What is left over that may have come by chance, and need not come again."""
-
-AT_A_PLACE = (LEVER.name, UnknownForces.name, UnknownMoments.name)
-"""What is left over that is told with the place at which it acts."""
+AFTER = {"left.astray": "next.repeat", LEVER.name: "next.axis"}
+AFTER |= dict.fromkeys((cause.name for cause in BEGUN), "next.repeat")
+AFTER |= dict.fromkeys((UnknownForces.name, UnknownMoments.name), "next.look")
+"""What to do about what is left: what may have come by chance need not come again, what acts at a place is there."""
 
 
 def present(
@@ -165,8 +164,7 @@ def what_next(
         return next_experiment(bench, conclusion.accepted, conclusion.rivals, settings)
     if left is not None:
         turn = "next.turn" if bench.facts.returns else "next.turn-unload"
-        look = "next.repeat" if left in BY_CHANCE else "next.look" if left in AT_A_PLACE else turn
-        return NextExperiment(**NextExperiment.told(Message(look)), separates=[])
+        return NextExperiment(**NextExperiment.told(Message(AFTER.get(left, turn))), separates=[])
     if not bench.facts.returns:
         hidden = ["bearing_friction", "hysteresis", "plastic_set"]
         return NextExperiment(**NextExperiment.told(Message("next.unload")), separates=hidden)

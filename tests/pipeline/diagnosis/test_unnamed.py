@@ -80,6 +80,7 @@ def test_a_cable_that_ends_beside_the_axis_of_its_bearing(protocol, seed, lever)
     cable = Cable(lever=lever)
     part, _, _ = among(hidden_test(cable, PROTOCOLS[protocol], largest=LARGEST, seed=seed), "")
     assert part.verdict == "unexplained" and part.leftover.key == "unnamed.lever", part.headline
+    assert part.next_experiment.key == "next.axis"
     said = part.leftover.values
     size, std, unit = said["size"]
     assert (said["side"], unit) == ("left", "m") and size == pytest.approx(abs(lever), abs=4.0 * std) and std < 1e-4
