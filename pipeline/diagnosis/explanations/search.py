@@ -226,7 +226,10 @@ class Search:
             least = max(SHAPE_GAIN, one.fitted.chi2 - hopeless)
             since = [k for k in loud if k is not None and about.statistic[k] ** 2 > least]
             fits = (fit_term(bench.observation, one.fitted, about, k, hopeless=hopeless) for k in since)
-            self._weigh_unnamed(one.causes, fits)
+            # what the linear model promised is worth going on for
+            usable = (found for found in fits if found is not None and found.run.prediction is not None)
+            whole = (found if found.converged else settled(bench.observation, found) for found in usable)
+            self._weigh_unnamed(one.causes, whole)
         for unknown in UNKNOWN:
             self._weigh_unknown(unknown, hopeless)
 

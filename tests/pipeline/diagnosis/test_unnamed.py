@@ -74,7 +74,7 @@ def test_a_cable_that_slides_through_a_bearing(protocol, seed, rivals):
     assert f_error(part.extended, cable)[0] < 0.02
 
 
-@pytest.mark.parametrize(("protocol", "seed", "lever"), [("six", 92, 4e-4), ("loop", 93, -3e-4)])
+@pytest.mark.parametrize(("protocol", "seed", "lever"), [("six", 94, 8e-4), ("loop", 93, -3e-4)])
 def test_a_cable_that_ends_beside_the_axis_of_its_bearing(protocol, seed, lever):
     """Photos show by how much. It was taken for a step of the pre-curvature there, at 0.88, and f_EI was 8 % off."""
     cable = Cable(lever=lever)
