@@ -4,10 +4,11 @@ A section's midpoint is the mean of its edges. An edge that contradicts its neig
 cable) is replaced by the other one and the local width; a section without any edge is left out, and a stretch of
 another width.
 
-Where a narrow shadow lies along one edge, the place of that edge is open by pixels and that of the other is not. The
-width ``W`` of a cable is constant, so each edge tells the midpoint, ``e1 + W/2`` and ``e2 - W/2``: they are weighted by
-the inverse variances ``v`` of their places, of which half the move between two edge models is the measure. ``W`` is
-measured where both are sure. Edges as sure as a cable is round are averaged, whatever ``W``.
+Where a narrow shadow lies along one edge, or a flank is as dark as the ground, the place of that edge is open by pixels
+and that of the other is not. The width ``W`` of a cable is constant, so each edge tells the midpoint, ``e1 + W/2`` and
+``e2 - W/2``: they are weighted by the inverse variances ``v`` of their places, of which half the move between two edge
+models and half of what an edge is broader than the other are the measure. ``W`` is measured where both are sure, and
+held to the stated diameter as far as that is known. Edges as sure as a cable is round are averaged, whatever ``W``.
 
 What the light does to both edges of a section alike (same direction on the photo) moves the midline slowly along s,
 and no averaging removes it. Its size is judged by what is seen on the photo itself:
