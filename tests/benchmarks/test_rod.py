@@ -134,7 +134,7 @@ def test_ten_derivatives_cost_at_most_one_equilibrium(benchmark) -> None:
     steps = simulate(test, STEPS)
     parameters = ten(test)
     call = partial(derivatives, test, steps[:1], parameters)
-    assert len(benchmark(call)[0].names) == 10
+    assert benchmark(call)[0].force.shape == (10,)
     if enabled(benchmark):
         hold = test.hold("displacements", 1.04 * STEPS[0])
         warm, cold = partial(solve, test.rod, hold, start=steps[0]), partial(simulate, replace(test), STEPS[:1])
