@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from rod.balance import balance
+from rod.balance import BalanceOutcome, balance
 from rod.bending_test import TABLE_1_KNOTS, simulate, table_1
 from rod.inverse import estimate
 from rod.inverse.fit import evaluated, shown
@@ -71,7 +71,7 @@ def test_six_photos_with_bands_cost_a_hundred_simulations(benchmark, six_photos,
 
 
 def test_balance_costs_a_few_dozen_simulations(benchmark, six_photos, truth):
-    assert benchmark(balance, six_photos).measured
+    assert benchmark(balance, six_photos).outcome is BalanceOutcome.MEASURED
     if benchmark.enabled:
         unit = seconds(lambda: cold(truth))
         benchmark.extra_info["simulations"] = benchmark.stats["min"] / unit
