@@ -10,8 +10,7 @@ bends           all along the cable, by moments in half waves: loads of one to f
                 magnet, a table that rubs), have moments M'' = q that fall with the square of their number. A moment M
                 bends the cable as a rest that is moved by M / f_EI does, and is told as that curvature
 
-Or the cable ends beside the axis of its bearing (`Lever`), as photos show, and the force bends it by that; or the load
-cell shows less of what exceeds some force (`Limit`).
+Or the cable ends beside the axis of its bearing (`Lever`), as photos show, and the force bends it by that.
 
 None has a name in the catalogue, so what it explains is something else; but f_EI beside it can be told, and where
 and when it acts.
@@ -26,7 +25,6 @@ from typing import ClassVar
 import numpy as np
 
 from pipeline.diagnosis.causes.begun import BEGUN, SHARE, Begun, joints, with_more
-from pipeline.diagnosis.causes.load_cell import shown
 from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.extension import Term
@@ -221,31 +219,6 @@ class Lever(Cause):
         return replace(model, bending=replace(moved, left=longer) if left else replace(moved, right=longer))
 
 
-class Limit(Cause):
-    """Beyond a force, ``at`` times the largest, the load cell shows less of what exceeds it: a stop bears the rest."""
-
-    name = "unnamed.limit"
-    unit = "-"
-    seat = "load cell"
-
-    def plausible(self, facts: Facts) -> float:
-        """A tenth."""
-        return 0.1
-
-    def chance(self, variant: Variant, facts: Facts) -> float:
-        """As likely beforehand as one thing that begins."""
-        return SHARE / len(BEGUN)
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """From a force on that is tuned, sought from several: forces of most steps lie near the largest."""
-        return tuple(Variant(at=at, tuned=("at",), at_range=(0.05, 0.98)) for at in (0.3, 0.5, 0.7, 0.8, 0.9, 0.95))
-
-    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Add ``amount`` times what exceeds that force."""
-        limit = variant.at * facts.force_scale
-        return model.observed(shown(lambda force, time, begin: force + amount * np.maximum(force - limit, 0.0)))
-
-
 def carried_over(terms: Sequence[Term], known: Sequence[Term], amounts: Array, facts: Facts) -> Array:
     """Amounts (k,) of terms that make what others of given ``amounts`` make at each step; none of what these lack."""
 
@@ -268,6 +241,6 @@ def _at(u: float, joints: Array) -> Array:
     return np.asarray(np.maximum(1.0 - np.abs(joints - inside) / joints[1], 0.0))
 
 
-PLACE, LEVER, LIMIT = PlaceOfForce(), Lever(), Limit()
+PLACE, LEVER = PlaceOfForce(), Lever()
 UNKNOWN: tuple[UnknownMoments | UnknownForces | UnknownBends, ...] = (UnknownMoments(), UnknownForces(), UnknownBends())
-UNNAMED: tuple[Begun | _Unknown | PlaceOfForce | Lever | Limit, ...] = (*BEGUN, LEVER, LIMIT, *UNKNOWN, PLACE)
+UNNAMED: tuple[Begun | _Unknown | PlaceOfForce | Lever, ...] = (*BEGUN, LEVER, *UNKNOWN, PLACE)

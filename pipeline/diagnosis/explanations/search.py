@@ -23,7 +23,6 @@ import numpy as np
 from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.unnamed import (
     LEVER,
-    LIMIT,
     SIZES,
     UNKNOWN,
     UnknownBends,
@@ -222,7 +221,7 @@ class Search:
         known = [base, *(found.found for found in self.posterior.explanations()[:LIKELIEST] if found.found)]
         hopeless = min(one.fitted.chi2 for one in known) + LEAST
         for one in known:
-            about = suspect(bench.observation, one.fitted, (*BEGUN, LEVER, LIMIT))
+            about = suspect(bench.observation, one.fitted, (*BEGUN, LEVER))
             loud = (about.best(number) for number in range(len(about.causes)))
             least = max(SHAPE_GAIN, one.fitted.chi2 - hopeless)
             since = [k for k in loud if k is not None and about.statistic[k] ** 2 > least]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.causes.begun import BEGUN
-from pipeline.diagnosis.causes.unnamed import LEVER, LIMIT, PLACE, POINTS, UNKNOWN
+from pipeline.diagnosis.causes.unnamed import LEVER, PLACE, POINTS, UNKNOWN
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.maps import across_cable
 from pipeline.diagnosis.fits.workbench import Workbench
@@ -53,9 +53,6 @@ def _unnamed(bench: Workbench, fitted: Fit) -> Message | None:
         size = (*fitted.amount(k), term.cause.unit)
         if term.cause is LEVER:
             return Message(LEVER.name, side=term.variant.label, size=size)
-        if term.cause is LIMIT:
-            limit = fitted.extension.formed(fitted.vector, k).variant.at * bench.facts.force_scale
-            return Message(LIMIT.name, force_N=limit, size=size)
         if term.cause in BEGUN:
             step = bench.test.steps[int(term.variant.at)]
             more = Message("begun.growing") if term.variant.width else ""

@@ -87,24 +87,6 @@ def test_a_cable_that_ends_beside_the_axis_of_its_bearing(protocol, seed, lever)
     assert f_error(part.extended, cable)[0] < 0.02
 
 
-def test_a_stop_that_bears_a_part_of_the_force():
-    """From nine tenths of the largest force on the load cell shows half of what is more. It was taken for a set."""
-    cable, test = Cable(), hidden_test(Cable(), PROTOCOLS["six"], largest=LARGEST, seed=95)
-    limit = 0.9 * max(step.force for step in test.steps)
-
-    def read(force):
-        return np.minimum(force, limit) + 0.5 * np.maximum(force - limit, 0.0)
-
-    steps = (replace(one, force=float(read(one.force)), hold_forces=read(one.hold_forces)) for one in test.steps)
-    part, _, _ = among(replace(test, steps=tuple(steps)), "")
-    assert part.verdict == "unexplained" and part.leftover.key == "unnamed.limit", part.headline
-    assert part.next_experiment.key == "next.cell"
-    size, std, _ = part.leftover.values["size"]
-    assert size == pytest.approx(-0.5, abs=4.0 * std) and std < 0.1
-    assert part.leftover.values["force_N"] == pytest.approx(limit, rel=0.03)
-    assert f_error(part.extended, cable)[0] < 0.02
-
-
 @pytest.mark.parametrize(("protocol", "pad", "seed"), [("loop", 0.012, 85), ("six", 0.006, 86)])
 def test_a_bearing_that_meets_a_stop(protocol, pad, seed):
     """Free up to a turn, held by a rubber pad beyond it. Friction that differs from step to step comes near."""
