@@ -153,9 +153,11 @@ def _elsewhere(added: Addition) -> list[tuple[Array, bool]]:
     at = base.pre_curvature_index
     if at is None or len(base.names) != len(added.base.vector):
         return []
-    K0, seen, mirrored = float(added.base.vector[at]), base.as_seen(), base.neutral()
+    K0, seen, neutral, mirrored = float(added.base.vector[at]), base.as_seen(), base.neutral(), base.neutral()
     mirrored[at] = -K0
     found = [(seen, abs(float(seen[at]) - K0) <= ELSEWHERE * facts.curvature_scale)]
     if "mounted" not in facts.branch:
         found.append((mirrored, False))
-    return [(added.start(vector), spare) for vector, spare in (*found, (base.neutral(), True))]
+    if not np.array_equal(seen, neutral):  # of photos that tell nothing the two are the same start
+        found.append((neutral, True))
+    return [(added.start(vector), spare) for vector, spare in found]
