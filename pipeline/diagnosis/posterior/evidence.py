@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr
+from scipy.special import erfcx, log_ndtr
 
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid
 from pipeline.diagnosis.posterior.products import ASTRAY
@@ -266,7 +266,9 @@ def _sizes_unknown(value: Array, covariance: Array, parts: Sequence[tuple[Cause,
     (cause, own), *others = parts
     sizes, mine = (SIZES * cause.plausible(facts)) ** 2, covariance[:, own][..., own]
     if not others and len(own) == 1:
-        return _one_size_unknown(value[:, own[0]], mine[:, 0, 0], sizes, cause.sign)
+        alone, variance = value[:, own[0]], mine[:, 0, 0]
+        flat = 0.5 * (alone**2 / variance + np.log(variance) + LOG_2PI)
+        return log_gain(alone, variance, cause.plausible(facts), cause.sign) - flat
     logs = []
     for size in sizes:
         wide = np.linalg.inv(mine + size * np.eye(len(own)))
@@ -289,21 +291,27 @@ def _with_each(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array
 
     ``by_law`` (G, l, t, d): log p of each error model and prior of the law.
     """
-    several, (law, half) = by_law.shape[-1], _onto_law(solved)
+    several = by_law.shape[-1]
+    if not terms:
+        return np.zeros((2, several, 0))
+    law, half = _onto_law(solved)
     pulled = solved.products.cross[:, :several] - solved.pull.swapaxes(1, 2) @ half
-    least = mean_over_laws(by_law) + np.log(by_law[0, ..., 0].size) - FEW
+    mean, beside = mean_over_laws(by_law), solved.products.rest
+    least = mean + np.log(by_law[0, ..., 0].size) - FEW
+    # something else that is nothing for a residual is left out for it, though others in its company asked for it
+    least[beside] = np.maximum(least[beside], np.max(mean[beside], axis=0, initial=-np.inf) - NOTHING)
     total = np.full((2, several, law.shape[2]), -np.inf)
     for number, logs in enumerate(by_law.transpose(1, 3, 0, 2)):
         one, precision = solved.laws[number], told_of_columns(solved, number)
         along = one.vectors.swapaxes(1, 2) @ law
         for d in range(several):
-            told = logs[d] > least[:, d, None]
-            wide = 1.0 / precision[told]
-            amount = (pulled[:, None, d] - one.moves[..., d] @ along)[told] * wide
-            added = logs[d][told][:, None] + _gains(fitted, terms, amount, wide)
-            rest = solved.products.rest[np.nonzero(told)[0]]
+            model, tau = np.nonzero(logs[d] > least[:, d, None])
+            wide = 1.0 / precision[model, tau]
+            amount = (pulled[:, None, d] - one.moves[..., d] @ along)[model, tau] * wide
+            added = logs[d][model, tau] + _gains(fitted, terms, amount, wide)
+            rest = beside[model]
             for part, own in enumerate((~rest, rest)):
-                total[part, d] = np.logaddexp(total[part, d], _total(added[own]))
+                total[part, d] = np.logaddexp(total[part, d], _total(added[:, own].T))
     return np.asarray(total - np.log(by_law[0, ..., 0].size))
 
 
@@ -324,26 +332,31 @@ def _onto_law(solved: Solved) -> tuple[Array, Array]:
 
 
 def _gains(fitted: Fit, terms: Sequence[Term], amount: Array, variance: Array) -> Array:
-    """`log_gain` (n, k) of columns (k,) from their flat estimates and variances (n, k)."""
-    found = np.zeros(amount.shape)
-    for k, term in enumerate(terms):
-        plausible = term.cause.plausible(fitted.extension.facts)
-        found[:, k] = log_gain(amount[:, k], variance[:, k], plausible, term.cause.sign)
+    """`log_gain` (k, n) of columns (k,) from their flat estimates and variances (n, k)."""
+    found, facts = np.ascontiguousarray(amount.T), fitted.extension.facts
+    for k, (term, wide) in enumerate(zip(terms, np.ascontiguousarray(variance.T), strict=True)):
+        found[k] = log_gain(found[k], wide, term.cause.plausible(facts), term.cause.sign)
     return found
 
 
 def log_gain(amount: Array | float, variance: Array | float, plausible: float, sign: int) -> Array:
-    """Log of the factor by which a cause of a flat estimate and its variance, of one shape, changes p."""
-    value, wide = np.atleast_1d(amount), np.atleast_1d(variance)
-    flat = 0.5 * (value**2 / wide + np.log(wide) + LOG_2PI)
-    return np.asarray(flat + _one_size_unknown(value, wide, (SIZES * plausible) ** 2, sign))
+    """Log of the factor by which a cause of a flat estimate and its variance, of one shape, changes p.
 
-
-def _one_size_unknown(value: Array, variance: Array, sizes: Array, sign: int) -> Array:
-    """The same for a single amount: value and variance of one shape."""
-    sizes = sizes.reshape(-1, *[1] * value.ndim)
-    wide = variance + sizes
-    log = -0.5 * (value**2 / wide + np.log(wide) + LOG_2PI)
-    if sign:
-        log = log + np.log(2.0) + log_ndtr(sign * value * np.sqrt(sizes / (wide * variance)))
-    return np.asarray(log_sum(log) - np.log(len(SIZES)))
+    With x^2 = a^2 s^2 / (S (S + s^2)) it is the mean over s of (S / (S + s^2))^(1/2) exp(x^2 / 2), times 2 Phi(x) where
+    the sign is known; exp(x^2 / 2) 2 Phi(-x) = erfcx(x / 2^(1/2)), so nothing overflows where the largest exponential
+    is taken out.
+    """
+    value, own = np.atleast_1d(amount), np.atleast_1d(variance)
+    half, sizes = 0.5 * value * (value / own), (SIZES * plausible) ** 2
+    right = sign * value > 0.0 if sign else np.ones(value.shape, dtype=bool)
+    toward, root = np.where(right, half, 0.0), np.sqrt(half)
+    top, total = toward * (sizes[-1] / (own + sizes[-1])), np.zeros(value.shape)
+    against, twice = np.where(right, -1.0, 1.0) * np.exp(-top), 2.0 * right
+    for size in sizes:
+        wide = own + size
+        share = size / wide
+        likely = np.exp(toward * share - top)
+        if sign:
+            likely = twice * likely + against * erfcx(root * np.sqrt(share))
+        total += np.sqrt(own / wide) * likely
+    return np.asarray(top + np.log(total / len(SIZES)))
