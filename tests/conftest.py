@@ -36,7 +36,22 @@ def pytest_report_header() -> str:
     return f"shared specimens: none in {SHARED}; tests that read them are left out, set CABLEBEND_SHARED to run them"
 
 
+LONG = (
+    "test_hidden_effects",
+    "test_unnamed",
+    "test_posterior",
+    "test_faults",
+    "test_two_causes",
+    "test_by_step",
+    "test_hostile",
+    "test_free_profile",
+    "test_displacement",
+)
+"""Files that take minutes, the longest first: a file goes to one worker, and one that came last would keep it alone."""
+
+
 def pytest_collection_modifyitems(config, items):
+    items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
     if not SHARED.is_dir():
         left_out = [item for item in items if item.get_closest_marker("shared")]
         config.hook.pytest_deselected(items=left_out)

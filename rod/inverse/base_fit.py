@@ -130,16 +130,17 @@ PAYS, ATTEMPTS = 1.0, 3
 by less than what another abscissa brings."""
 
 
-def settled(observation: Observation, fitted: Fit) -> Fit:
+def settled(observation: Observation, fitted: Fit, *, hopeless: float = np.inf) -> Fit:
     """Continue a fit that ran out of steps, and lay the abscissa along the law found as long as that brings something.
 
-    It lies along the law that a fit began with, and the law found may have a knee where that one had none.
+    It lies along the law that a fit began with, and the law found may have a knee where that one had none. For
+    ``hopeless`` see `rod.inverse.fit.fit`.
     """
     for _ in range(ATTEMPTS):
         if fitted.run.prediction is None:
             break
         start = laid_along(fitted) if fitted.converged else (fitted.extension, fitted.vector)
-        further = fit(observation, *start, near=fitted.run)
+        further = fit(observation, *start, near=fitted.run, hopeless=hopeless)
         gained = fitted.chi2 - _cost(further)
         if gained > 0.0:
             fitted = further

@@ -17,6 +17,14 @@ MOST = 8
 """Causes refitted at most, best linear scores first; time."""
 
 
+def far_behind(best: float) -> float:
+    """Chi-square above which no fit is gone on with beside one that leaves ``best``: twice that, and noise.
+
+    What lies nearer may gain by what else is weighed beside it, something else or fewer numbers.
+    """
+    return 2.0 * best + LEAST
+
+
 def candidates(suspicion: Suspicion, *, any_sign: bool = False, margin: float = MARGIN, most: int = MOST) -> list[int]:
     """Causes worth a refit: those whose linear chi-square gain lies within a margin of the best.
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.diagnosis.causes import Cause
 from pipeline.diagnosis.causes.profile import forms_between
+from pipeline.diagnosis.explanations.candidates import far_behind
 from pipeline.diagnosis.explanations.refit import cost
 from rod.inverse.cause import Variant
 from rod.inverse.extension import Extension, Term
@@ -102,5 +103,5 @@ def as_one_form(observation: Observation, fitted: Fit) -> list[Fit]:
     for variant, amount, stiffer in forms_between(extension.base_model(fitted.vector), extension.model(fitted.vector)):
         alone = Extension(extension.base, extension.facts, (Term(cause, variant),))
         start = alone.base.stiffer(alone.start(fitted.vector, (amount,)), 1.0 + stiffer)
-        found.append(fit(observation, alone, start, near=fitted.run))
+        found.append(fit(observation, alone, start, near=fitted.run, hopeless=far_behind(fitted.chi2)))
     return sorted((one for one in found if one.run.prediction is not None), key=lambda one: one.chi2)[:1]

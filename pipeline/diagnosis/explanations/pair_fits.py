@@ -60,21 +60,21 @@ def together(bench: Workbench, directions: Sequence[int]) -> list[Explanation]:
     return [explanation_of(causes, base, fitted)] if fitted.converged else []
 
 
-def with_all_forms(bench: Workbench, found: list[Explanation]) -> list[Explanation]:
-    """Pairs, best first, with all components of their causes."""
+def with_all_forms(bench: Workbench, found: list[Explanation], *, hopeless: float = np.inf) -> list[Explanation]:
+    """Pairs, best first, with all components of their causes; above a chi-square of ``hopeless`` that is of no use."""
     every: dict[frozenset[int], Explanation] = {}
     for pair in sorted(found, key=lambda e: -e.worth):
         if frozenset(pair.causes) not in every:
-            every[frozenset(pair.causes)] = with_components(bench, pair)
+            every[frozenset(pair.causes)] = with_components(bench, pair, hopeless=hopeless)
     return list(every.values())
 
 
-def with_components(bench: Workbench, pair: Explanation) -> Explanation:
+def with_components(bench: Workbench, pair: Explanation, *, hopeless: float = np.inf) -> Explanation:
     """A pair with the other components of what it has one of, such as the second one of a load."""
     fitted = pair.fitted
     for term in pair.fitted.extension.terms:
         if term.variant.component:
-            fitted = with_all_components(bench.observation, fitted, term)
+            fitted = with_all_components(bench.observation, fitted, term, hopeless=hopeless)
     return pair if fitted is pair.fitted else explanation_of(pair.causes, bench.base, fitted)
 
 

@@ -30,7 +30,7 @@ from pipeline.diagnosis.causes.unnamed import (
     UnknownMoments,
     carried_over,
 )
-from pipeline.diagnosis.explanations.candidates import LEAST, candidates, hidden_pair
+from pipeline.diagnosis.explanations.candidates import LEAST, candidates, far_behind, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
 from pipeline.diagnosis.explanations.pair_fits import by_step, in_any_form, pairs_beside, together, with_all_forms
 from pipeline.diagnosis.explanations.refit import fit_term
@@ -78,13 +78,19 @@ class Search:
         rest = self.hypotheses[0].rest
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
-        best = [self._settled(one) for _, one in new[:LIKELIEST]]
+        hopeless = far_behind(self._least([one for _, one in new]))
+        best = [self._settled(one, hopeless) for _, one in new[:LIKELIEST]]
         self.hypotheses += [refitted(self.grid, one, self.bench.facts) for one in best]
         self.hypotheses += [Hypothesis(one.causes, plain, rest, one) for plain, one in new[LIKELIEST:]]
         return [*best, *(one for _, one in new[LIKELIEST:])]
 
-    def _settled(self, one: Explanation) -> Explanation:
-        fitted = settled(self.bench.observation, one.fitted)
+    def _least(self, new: Sequence[Explanation] = ()) -> float:
+        """Smallest chi-square of all refits of named causes; infinite without any."""
+        known = (one.found for one in self.hypotheses if one.found is not None and not one.found.unnamed)
+        return min((one.fitted.chi2 for one in (*known, *new)), default=np.inf)
+
+    def _settled(self, one: Explanation, hopeless: float) -> Explanation:
+        fitted = settled(self.bench.observation, one.fitted, hopeless=hopeless)
         return one if fitted is one.fitted else explanation_of(one.causes, self.bench.base, fitted)
 
     def singles(self) -> list[Explanation]:
@@ -146,7 +152,7 @@ class Search:
             found += self.add(self._pairs_beside(best, others))
         elif believed.total(count=2) < sum(SHARES[2]):
             return
-        forms = with_all_forms(bench, found)
+        forms = with_all_forms(bench, found, hopeless=far_behind(self._least()))
         new = [one for one in forms if one not in found]
         new += in_any_form(bench, forms)
         new = self.add(new)
@@ -169,9 +175,7 @@ class Search:
         return {cause: plain + mine - beside.own.plain for cause, (plain, _) in beside.further.items()}
 
     def _pairs_beside(self, one: Explanation, causes: Sequence[int]) -> list[Explanation]:
-        named = (known.found for known in self.hypotheses if known.found is not None and not known.found.unnamed)
-        rival = min((found.fitted.chi2 for found in named), default=np.inf)
-        return pairs_beside(self.bench, one, self.beside(one), causes, rival=rival)
+        return pairs_beside(self.bench, one, self.beside(one), causes, rival=self._least())
 
     def _members_alone(self, begun: set[Forms]) -> Iterator[Explanation]:
         """Causes of the likeliest pair, each fitted alone in the form that it has there, if that is new."""
