@@ -17,7 +17,8 @@ from tests.pipeline.diagnosis.among import among
 SETTINGS = DiagnosisSettings()
 
 RIVALS_OF_A_SPRING = "bearing_stiffness stiffness_varying stiffness_drift lens_distortion force_drift"
-"""Causes that leave the least beside the photo that is off; the other case asks them all."""
+"""The likeliest ones before the photo that is off is left out; the other case asks them all. Without leaving it out
+this case fails."""
 
 
 @pytest.fixture(scope="module")

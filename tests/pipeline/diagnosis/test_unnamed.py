@@ -19,8 +19,8 @@ from tests.pipeline.diagnosis.among import among
 RIVALS_OF_A_SLIDE = "out_of_plane_bow stiffness_drift plastic_set displacement_offset length_error camera_tilt"
 RIVALS_OF_A_STOP = "bearing_friction bearing_stiffness hysteresis plastic_set force_drift in_plane_load"
 RIVALS_OF_A_POST = "stiffness_varying bearing_friction bearing_stiffness in_plane_load plastic_set stiffness_drift"
-"""What comes nearest in the diagnosis by all causes, which the other case of each test asks: with no unknown forces in
-the search one of these, or something else without a place, is told."""
+"""Causes that bend the cable as a stop or a post may; the other case of each test asks them all. Without unknown forces
+in the search a case of these few fails as well."""
 
 
 def changed(before, after, protocol, first, *, seed):
