@@ -165,8 +165,10 @@ def as_photographed(
     bins = [part for part in np.array_split(order, BINS) if part.size]
     m, K = (np.array([np.mean(row[part]) for part in bins]) for row in (moment, curvature))
     K = isotonic_regression(K).x
-    low = m < m[0] + 0.1 * (m[-1] - m[0])
-    low[:3] = True
+    if not m[-1] > m[0]:
+        return None
+    # a force-free photo fills the first bins, all of no moment: they are one point of a line
+    low = m <= max(m[0] + 0.1 * (m[-1] - m[0]), np.unique(m)[:3][-1])
     slope, at_zero = np.polyfit(m[low], K[low], 1)
     rest = float(at_zero) if rest is None else rest
     bend = np.append(0.0, K - rest)

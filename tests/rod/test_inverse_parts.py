@@ -10,7 +10,7 @@ from rod.compliance_law import moment_basis
 from rod.inverse import estimate
 from rod.inverse.base import start
 from rod.inverse.base_fit import base_fit
-from rod.inverse.laws import SOFTER, AnyLaw
+from rod.inverse.laws import BINS, SOFTER, AnyLaw, as_photographed
 from rod.inverse.prediction import Model, facts_of
 from rod.inverse.simulation import freedom, run
 from rod.midline import block_covariance, midline
@@ -36,6 +36,19 @@ def test_a_law_softens_by_what_its_logarithm_falls_from_rest_to_the_farther_end(
     rest = -low / (high - low)
     assert told * SOFTER[1] + SOFTER[0] == pytest.approx(sign * (rest - farther), abs=1e-9)
     assert told == pytest.approx(by @ greville - SOFTER[0] / SOFTER[1])
+
+
+@pytest.mark.parametrize("free", [0, 40, BINS * 5])
+def test_a_law_is_photographed_beside_sections_without_a_moment(free):
+    """Covers hide the ends of a thick cable: between a force-free photo and the loaded ones lie no small moments."""
+    moment = np.r_[np.zeros(free), np.linspace(0.03, 0.2, BINS * 15)]
+    law, coefficients, rest = as_photographed(moment, 2.0 + moment / 5e-3, unit=5e-3)
+    assert rest == pytest.approx(2.0, abs=1e-6)
+    assert law.basis.law(coefficients).at(moment[free:])[1] == pytest.approx(1.0 / 5e-3, rel=0.02)
+
+
+def test_moments_that_are_all_alike_show_no_law():
+    assert as_photographed(np.zeros(100), np.linspace(1.0, 2.0, 100), unit=5e-3) is None
 
 
 def test_the_chord_of_a_photo_is_the_distance_of_its_ends():
