@@ -43,10 +43,11 @@ class _Parts(NamedTuple):
 
 
 class Centre(NamedTuple):
-    """What is stated: log f_EI at curvatures (n,) 1/m and, last, K0 (n + 1,)."""
+    """What is stated: log f_EI at curvatures (n,) 1/m and, last, K0 (n + 1,), with the standard deviations."""
 
     kappa: Array
     values: Array
+    std: Array
 
 
 def centre_of(curve: Curve) -> Centre:
@@ -54,8 +55,9 @@ def centre_of(curve: Curve) -> Centre:
     seen = visited("extended", curve)
     assert seen is not None  # a curve of a fit has two points at least
     at = np.unique(np.linspace(0, len(seen.kappa) - 1, READ).astype(int))
-    tangent = np.maximum(seen.tangent, 1e-3 * float(np.max(seen.tangent)))[at]
-    return Centre(seen.kappa[at], np.append(np.log(tangent), seen.pre_curvature))
+    tangent, std = np.maximum(seen.tangent, 1e-3 * float(np.max(seen.tangent)))[at], seen.tangent_std[at]
+    rest, rest_std = seen.pre_curvature, seen.pre_curvature_std
+    return Centre(seen.kappa[at], np.append(np.log(tangent), rest), np.append(std / tangent, rest_std))
 
 
 READ = 31
@@ -78,7 +80,7 @@ def widening(
     fitted by way one.
     """
     refit, nearest = own or (base, base)
-    here, (move, told) = stated(nearest, centre.kappa), as_told(grid, nearest)
+    here, (move, _) = stated(nearest, centre.kappa), as_told(grid, nearest)
     # what way one states is the mean over all priors of the law for data as wrong as they say
     offset = np.zeros_like(centre.values) if own else centre.values - here.values - here.rows @ move
     parts = [
@@ -89,9 +91,7 @@ def widening(
     mean = np.vstack([part.mean for part in parts])
     variance = np.vstack([np.sum(part.root**2, axis=2) for part in parts])
     band = _half_width(weight / weight.sum(), mean, np.sqrt(variance)) / 1.96  # of a normal one
-    # the curve's own band stands for what the same data leave unknown of its law
-    known = np.einsum("np,pq,nq->n", here.rows, told, here.rows)
-    extra = np.sqrt(np.maximum(band**2 - known, 0.0))
+    extra = np.sqrt(np.maximum(band**2 - centre.std**2, 0.0))
     covariance = sum(_covariance(part) for part in parts)
     return _told(centre.kappa, extra, np.asarray(covariance) / weight.sum())
 
