@@ -9,6 +9,7 @@ forces          at a place, across the chord, and along it as well where that is
 bends           all along the cable, by moments in half waves: loads of one to four half waves, as likely each (a pad, a
                 magnet, a table that rubs), have moments M'' = q that fall with the square of their number. A moment M
                 bends the cable as a rest that is moved by M / f_EI does, and is told as that curvature
+readings        on the load cell alone: a spring, a bellows or a stop beside the cable, which bears or adds a force
 
 Or the cable ends beside the axis of its bearing (`Lever`), as photos show, and the force bends it by that.
 
@@ -28,7 +29,7 @@ from pipeline.diagnosis.causes.begun import BEGUN, SHARE, Begun, joints, with_mo
 from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.extension import Term
-from rod.inverse.prediction import Facts, Model
+from rod.inverse.prediction import Facts, Model, Prediction
 
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Of the largest force, moment or bend, their standard deviation: steps of a factor 3.3, over which a normal density
@@ -157,6 +158,37 @@ class UnknownForces(_Unknown):
         return with_more(model, "forces_by_step", force[:, :, None] * way)
 
 
+class UnknownReadings(_Unknown):
+    """Forces that the load cell shows and the cable does not have."""
+
+    name = "unnamed.readings"
+    unit = "N"
+    seat = "load cell"
+    places: ClassVar = {"unnamed.cell": ("cell",)}
+
+    def plausible(self, facts: Facts) -> float:
+        """The largest force, of which shares are tried."""
+        return facts.force_scale
+
+    @staticmethod
+    def course(variant: Variant, facts: Facts) -> Array:
+        """Share (steps,) of the amount, by the displacement: what stands beside the cable knows no steps."""
+        first = facts.displacement[int(variant.width)] if variant.width else facts.displacement.min()
+        passed = facts.displacement - first
+        share = np.clip(passed / max(passed.max(), 1e-12), 0.0, 1.0)
+        return np.where(passed >= 0.0, np.cos(np.pi * variant.at * share), 0.0)
+
+    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
+        """Add ``amount`` to the readings, as its course says."""
+        more = amount * self.course(variant, facts)
+
+        def observer(prediction: Prediction, facts: Facts) -> Prediction:
+            samples = tuple(one + force for one, force in zip(more, prediction.samples, strict=True))
+            return replace(prediction, force=prediction.force + more, samples=samples)
+
+        return model.observed(observer)
+
+
 class PlaceOfForce(Cause):
     """Where near the place of its label the force acts that is in the model: so far beside it."""
 
@@ -242,5 +274,6 @@ def _at(u: float, joints: Array) -> Array:
 
 
 PLACE, LEVER = PlaceOfForce(), Lever()
-UNKNOWN: tuple[UnknownMoments | UnknownForces | UnknownBends, ...] = (UnknownMoments(), UnknownForces(), UnknownBends())
+Unknown = UnknownMoments | UnknownForces | UnknownBends | UnknownReadings
+UNKNOWN: tuple[Unknown, ...] = (UnknownMoments(), UnknownForces(), UnknownBends(), UnknownReadings())
 UNNAMED: tuple[Begun | _Unknown | PlaceOfForce | Lever, ...] = (*BEGUN, LEVER, *UNKNOWN, PLACE)

@@ -25,9 +25,7 @@ from pipeline.diagnosis.causes.unnamed import (
     LEVER,
     SIZES,
     UNKNOWN,
-    UnknownBends,
-    UnknownForces,
-    UnknownMoments,
+    Unknown,
     carried_over,
 )
 from pipeline.diagnosis.explanations.candidates import LEAST, candidates, far_behind, hidden_pair
@@ -237,7 +235,7 @@ class Search:
         for unknown in UNKNOWN:
             self._weigh_unknown(unknown, hopeless)
 
-    def _weigh_unknown(self, unknown: UnknownForces | UnknownMoments | UnknownBends, hopeless: float) -> None:
+    def _weigh_unknown(self, unknown: Unknown, hopeless: float) -> None:
         """Forces or moments of one size at each place, where they are likeliest of other sizes, and begins too."""
         facts, (smaller, first, *larger), base = self.bench.facts, SIZES, self.bench.base
         everywhere = [*unknown.places.values()]

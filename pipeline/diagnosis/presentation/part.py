@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.begun import BEGUN
 from pipeline.diagnosis.causes.load_cell import Relaxation, lost_unseen
-from pipeline.diagnosis.causes.unnamed import LEVER, UnknownForces, UnknownMoments
+from pipeline.diagnosis.causes.unnamed import LEVER, UnknownForces, UnknownMoments, UnknownReadings
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.heldout import measured_gain
@@ -36,7 +36,7 @@ from pipeline.result import BlindSpot, Curve, DiagnosisPart, NextExperiment
 from pipeline.settings.diagnosis import DiagnosisSettings
 from rod.inverse.fit import Fit
 
-AFTER = {"left.astray": "next.repeat", LEVER.name: "next.axis"}
+AFTER = {"left.astray": "next.repeat", LEVER.name: "next.axis", UnknownReadings.name: "next.empty"}
 AFTER |= dict.fromkeys((cause.name for cause in BEGUN), "next.repeat")
 AFTER |= dict.fromkeys((UnknownForces.name, UnknownMoments.name), "next.look")
 """What to do about what is left: what may have come by chance need not come again, what acts at a place is there."""
