@@ -107,25 +107,44 @@ def test_the_band_grows_with_what_no_cause_makes(sticks):
         assert part.verdict == "adequate" and np.median(std / curve(found.inverse).tangent_std_Nm2) < 1.5
 
 
-def test_the_band_is_that_of_the_law_that_is_stated():
-    """A refit's law may run off where nothing holds it; the error models speak of the law that is the answer.
-
-    About the refit they were 5 in log f_EI apart at rest, and the band of a constant law was 270 % wide there.
-    """
+@pytest.fixture(scope="module")
+def rubbing():
+    """A cable in bearings that rub: what it is fitted with, that refit, it identified again, and its curve."""
     causes = [cause for cause in CATALOGUE if cause.name == "bearing_friction"]
     test = hidden_test(Cable(bearing_friction=3e-3), PROTOCOLS["loop"], largest=LARGEST, seed=47)
     bench = prepare(faults_of_input(test), SETTINGS, causes=causes)
     refit = refit_one(bench.observation, bench.base, bench.suspicion, 0).fitted
     again = identified_again(bench.observation, refit)
-    answer = curve_of(again.fitted, covariance=again.covariance)
+    return bench, refit, again.fitted, curve_of(again.fitted, covariance=again.covariance)
+
+
+def widened(bench, answer, refit, again):
+    """Standard deviations (n,) of log f_EI that are added to a curve where a refit alone is believed."""
+    one = SimpleNamespace(
+        found=SimpleNamespace(fitted=refit, unnamed=False), causes=(0,), something_else=False, probability=1.0
+    )
+    grid, posterior = error_grid(bench.observation, bench.facts), SimpleNamespace(believed=[one])
+    wider = widening(grid, posterior, bench.base, bench.suspicion, centre_of(answer), own=(refit, again))
+    return np.linalg.norm(np.array(wider.tangent_factor), axis=1)
+
+
+def test_the_band_is_that_of_the_law_that_is_stated(rubbing):
+    """A refit's law may run off where nothing holds it; the error models speak of the law that is the answer.
+
+    About the refit they were 5 in log f_EI apart at rest, and the band of a constant law was 270 % wide there.
+    """
+    bench, refit, again, answer = rubbing
     law = slice(0, refit.extension.base.law.size)
     astray = refit.vector.copy()
     astray[law] += 2.0 * np.cos(2.0 * np.arange(law.stop))
-    astray = replace(refit, vector=astray)
-    one = SimpleNamespace(
-        found=SimpleNamespace(fitted=astray, unnamed=False), causes=(0,), something_else=False, probability=1.0
-    )
-    grid, centre = error_grid(bench.observation, bench.facts), centre_of(answer)
-    own = astray, again.fitted
-    wider = widening(grid, SimpleNamespace(believed=[one]), bench.base, bench.suspicion, centre, own=own)
-    assert np.linalg.norm(np.array(wider.tangent_factor), axis=1).max() < 0.02
+    assert widened(bench, answer, replace(refit, vector=astray), again).max() < 0.02
+
+
+def test_a_band_is_widened_from_what_the_curve_states_itself(rubbing):
+    """A fit that does not hold may state a band of nothing: the whole band of what is believed is added to it."""
+    bench, refit, again, answer = rubbing
+    sure = answer.model_copy(update={"tangent_std_Nm2": [1e-9 * f for f in answer.tangent_Nm2]})
+    whole, added = widened(bench, sure, refit, again), widened(bench, answer, refit, again)
+    own = centre_of(answer).std[:-1]
+    assert np.median(whole) > 0.5 * np.median(own)
+    assert np.hypot(added, own) == pytest.approx(np.maximum(whole, own), rel=1e-6)

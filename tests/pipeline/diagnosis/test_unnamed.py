@@ -91,6 +91,30 @@ def test_a_cable_that_ends_beside_the_axis_of_its_bearing(protocol, seed, lever)
     assert f_error(part.extended, cable)[0] < 0.02
 
 
+def test_a_bellows_beside_the_cable():
+    """It bears a force that rises with the displacement, ever faster, and bends no cable; f_EI was 15 % off.
+
+    On the way back too: on loading alone a cable that grows stiffer from step to step is the same.
+    """
+    cable, test = Cable(), hidden_test(Cable(), PROTOCOLS["loop"], largest=LARGEST, seed=95)
+    most, share = max(step.force for step in test.steps), [step.displacement / LARGEST for step in test.steps]
+    borne = 0.08 * most * np.array([0.4 * u / (1.4 - u) for u in share])
+    pairs = zip(test.steps, borne, strict=True)
+    steps = (replace(one, force=one.force + more, hold_forces=one.hold_forces + more) for one, more in pairs)
+    part, _, _ = among(replace(test, steps=tuple(steps)), "")
+    assert part.verdict == "unexplained" and part.leftover.key == "unnamed.readings", part.headline
+    assert part.next_experiment.key == "next.empty"
+    said = part.leftover.values
+    assert said["step"] == test.steps[int(np.argmax(borne))].step
+    size, std, unit = said["size"]
+    assert unit == "N" and size == pytest.approx(borne.max(), abs=4.0 * std) and std < 0.5 * borne.max()
+    K, f, band = (np.array(getattr(part.extended, of)) for of in ("kappa_per_m", "tangent_Nm2", "tangent_std_Nm2"))
+    off = f - cable.law(K - cable.K0)[1]
+    # the force that is borne is known to a fifth, and with it the scale of f_EI to a percent or two
+    assert not part.extended_refuted and np.sqrt(np.mean((off / f) ** 2)) < 0.04
+    assert np.mean(np.abs(off) < 1.96 * band) > 0.9 and np.median(band / f) < 0.05
+
+
 @pytest.mark.parametrize(
     ("protocol", "pad", "seed", "rivals"), [("loop", 0.012, 85, RIVALS_OF_A_STOP), ("six", 0.006, 86, "")]
 )
