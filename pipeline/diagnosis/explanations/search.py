@@ -270,7 +270,9 @@ class Search:
             yield fit(self.bench.observation, replace(base, terms=terms), start, near=near.run, hopeless=hopeless)
 
     def _weigh_unnamed(self, causes: tuple[int, ...], fits: Iterable[Fit | None]) -> list[Hypothesis]:
-        seen = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)
+        known = (fitted for fitted in fits if fitted is not None and fitted.run.prediction is not None)
+        # a fit that went astray leaves more than nothing at all does, up to what no arithmetic bears
+        seen = (fitted for fitted in known if fitted.chi2 < self.bench.base.chi2)
         found = (explanation_of(causes, self.bench.base, fitted) for fitted in seen)
         new = [refitted(self.grid.plain, one, self.bench.facts) for one in found]
         self.hypotheses += new
