@@ -6,6 +6,7 @@ Data by collocation, no rod of ours.
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from fixtures.continuum import Cable, bend
 from fixtures.effects import LARGEST, PROTOCOLS
 from fixtures.hidden import Reading, hidden_test
 from fixtures.trials import f_error
+from pipeline.diagnosis.explanations.search import Search
 from tests.pipeline.diagnosis.among import among
 
 RIVALS_OF_A_SLIDE = "out_of_plane_bow stiffness_drift plastic_set displacement_offset length_error camera_tilt"
@@ -165,3 +167,10 @@ def test_a_cable_that_meets_something(protocol, seed, place, force, along, rival
     assert unit == "N" and size == pytest.approx(force, abs=4.0 * std)
     error, covered = f_error(part.extended, cable)
     assert error < 0.02 and covered > 0.9
+
+
+def test_a_fit_that_went_astray_is_not_weighed():
+    """Residuals of 1e14, of a lever whose fit ran off, left no matrix positive, and the specimen was lost."""
+    astray = SimpleNamespace(chi2=1e29, run=SimpleNamespace(prediction=object()))
+    search = SimpleNamespace(bench=SimpleNamespace(base=SimpleNamespace(chi2=400.0)), grid=None, hypotheses=[])
+    assert Search._weigh_unnamed(search, (), [None, astray]) == [] and search.hypotheses == []
