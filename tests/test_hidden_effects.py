@@ -280,8 +280,7 @@ def test_an_effect_outside_the_catalogue_is_unexplained(alien):
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9)
     part, _, _ = diagnose(faults_of_input(with_alien(test, alien, 12.0 * alien_size("six", alien))), None, SETTINGS)
     assert part.verdict == "unexplained", part.headline
-    # in the forces, or a force that the load cell shows
-    assert {"sticking": "force"}.get(alien, "shapes") in part.leftover.message
+    assert {"sticking": "forces"}.get(alien, "shapes") in part.leftover.message
 
 
 def test_f_beside_something_unexplained_is_no_better_known_than_without_the_nearest_cause():
