@@ -165,8 +165,8 @@ class BendingTest:
 
     @cached_property
     def free(self) -> Equilibrium:
-        """The mounted cable under its load, free to slide: no force at the right bearing."""
-        return solve(self.rod, self.hold("forces", 0.0))
+        """The mounted cable under its load and the first of given forces, free to slide: none at the right bearing."""
+        return solve(self.rod_at(0), self.hold("forces", 0.0))
 
     @property
     def zero_chord(self) -> float:

@@ -283,17 +283,20 @@ def test_an_effect_outside_the_catalogue_is_unexplained(alien):
     assert {"sticking": "forces"}.get(alien, "shapes") in part.leftover.message
 
 
-def test_f_beside_something_unexplained_is_no_better_known_than_without_the_nearest_cause():
-    """Whether that cause is there at all is not known: with a drift of the forces f_EI is up to 23 % another."""
+@pytest.mark.parametrize("alien", ["waves", "bump", "sticking"])
+def test_f_beside_something_unexplained_is_that_of_the_cable(alien):
+    """A cause that is surely there is in the answer, whatever is beside it: without the drift f_EI is 23 % another."""
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9, reading=Reading(force_drift=2e-3))
-    strange = with_alien(test, "waves", 12.0 * alien_size("six", "waves"))
+    strange = with_alien(test, alien, 12.0 * alien_size("six", alien))
     part, _, _ = diagnose(faults_of_input(strange), None, SETTINGS)
     assert (part.verdict, [cause.name for cause in part.causes]) == ("unexplained", ["force_drift"])
     base = bench_of(strange).base
     rest = base.extension.base.pre_curvature(base.vector)
     apart = law_of(base).tangent(np.array(part.extended.kappa_per_m), rest) - part.extended.tangent_Nm2
-    assert np.all(np.abs(apart) <= (1.0 + 1e-9) * np.array(part.extended.tangent_std_Nm2))
     assert np.abs(apart / part.extended.tangent_Nm2).max() > 0.1
+    error, covered = f_error(part.extended, Cable())
+    assert covered >= 0.95
+    assert error < 0.1 and np.median(np.divide(part.extended.tangent_std_Nm2, part.extended.tangent_Nm2)) < 0.1
 
 
 RENDERED = {

@@ -56,14 +56,18 @@ class Bends:
         self.at.append(j)
 
 
-def plainly(extension: Extension, vector: Array, base_model: Model) -> Model:
-    """The model at a vector (p,) without profiles along the cable, which no other cause touches."""
-    model = base_model
-    for k, at in enumerate(extension.amounts_at):
+def plainly(extension: Extension, vector: Array, model: Model, *, since: int = 0) -> list[Model]:
+    """Models at a vector (p,), one after each term from ``since`` on, without profiles along the cable.
+
+    No other cause touches these. The first is the given ``model``, that before term ``since``.
+    """
+    models = [model]
+    for k, at in list(enumerate(extension.amounts_at))[since:]:
         if not isinstance(extension.terms[k].cause, Profile):
             term = extension.formed(vector, k)
             model = term.cause.apply(model, float(vector[at]), term.variant, extension.facts)
-    return model
+        models.append(model)
+    return models
 
 
 def bending_numbers(extension: Extension, vector: Array, base_model: Model, here: Model) -> tuple[Bends, list[int]]:
@@ -85,12 +89,9 @@ def bending_numbers(extension: Extension, vector: Array, base_model: Model, here
         if isinstance(term.cause, Profile):
             _of_profile(bends, extension, vector, k, term.cause, here)
             continue
-        alone = term.cause.apply(base_model, float(vector[at]), term.variant, extension.facts)
-        if alone.bending is base_model.bending and alone.shift is base_model.shift:
+        if plain[k + 1].bending is plain[k].bending and plain[k + 1].shift is plain[k].shift:
             continue
-        for j in numbers:
-            if not _of_number(bends, extension, vector, base_model, plain, j):
-                simulated.append(j)
+        simulated += [j for j in numbers if not _of_number(bends, extension, vector, plain, k, j)]
     return bends, simulated
 
 
@@ -139,11 +140,19 @@ def _of_profile(bends: Bends, extension: Extension, vector: Array, k: int, cause
         bends.by((name, move[::-1] if extension.turned else move), at + i)
 
 
-def _of_number(bends: Bends, extension: Extension, vector: Array, base_model: Model, plain: Model, j: int) -> bool:
-    """What any other number changes; False where it changes the kind of the model."""
-    trial, step = vector.copy(), SHORT * float(extension.steps[j])
+def _of_number(bends: Bends, extension: Extension, vector: Array, models: list[Model], k: int, j: int) -> bool:
+    """What number ``j``, of term ``k``, changes; False where it changes the kind of the model.
+
+    ``models`` is as of `plainly`, with all terms. What a cause adds to what its other terms make may be added last.
+    """
+    plain, term, step = models[-1], extension.terms[k], SHORT * float(extension.steps[j])
+    trial, last = vector.copy(), extension.terms_of(term.cause)[-1]
     trial[j] += step
-    there = plainly(extension, trial, base_model)
+    if term.cause.adds:
+        more = term.cause.apply(models[last + 1], step, term.variant, extension.facts)
+        there = plainly(extension, vector, more, since=last + 1)[-1]
+    else:
+        there = plainly(extension, trial, models[k], since=k)[-1]
     known = comparable(plain.bending, there.bending)
     if not known or freedom(plain, extension.facts) != freedom(there, extension.facts):
         return False

@@ -111,6 +111,8 @@ class Cause(ABC):
         Whether several forms may act together (a profile along the cable is a sum of forms).
     additive : bool
         Whether the amounts of forms acting together add up; else the largest is the size of the cause.
+    adds : bool
+        Whether it does the same whatever its other terms do, in proportion to its amount.
     limited : bool
         Whether many times the plausible amount cannot be. A number typed wrongly, a zero never set, a bearing that has
         seized, a heavy or patched cable may be off by any amount.
@@ -122,6 +124,7 @@ class Cause(ABC):
     sign: ClassVar[int] = 0
     combines: ClassVar[bool] = False
     additive: ClassVar[bool] = False
+    adds: ClassVar[bool] = False
     limited: ClassVar[bool] = False
 
     @abstractmethod

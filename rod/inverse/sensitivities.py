@@ -65,7 +65,7 @@ def sensitivities(observation: Observation, extension: Extension, vector: Array,
     same = Prediction.varied([here.bare] * len(of_base))
     ways = [(bends.at, bent), (of_base, observed(same, replace(here.model, observers=every), facts))]
     if of_causes:
-        models = (plainly(extension, trials[j], base_model) for j in of_causes)
+        models = (plainly(extension, trials[j], base_model)[-1] for j in of_causes)
         ways.append((of_causes, Prediction.varied([observed(here.bare, model, facts) for model in models])))
     count, prior = observation.rows.count, extension.prior
     table = np.zeros((count + len(prior), len(vector)))

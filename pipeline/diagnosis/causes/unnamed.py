@@ -29,11 +29,12 @@ from pipeline.diagnosis.causes.begun import BEGUN, SHARE, Begun, joints, with_mo
 from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.extension import Term
+from rod.inverse.fit import Fit
 from rod.inverse.prediction import Facts, Model, Prediction
 
 SIZES = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Of the largest force, moment or bend, their standard deviation: steps of a factor 3.3, over which a normal density
-hardly changes, from what is just seen to what is another experiment; the second one is tried first."""
+hardly changes, from what is just seen to what is another experiment."""
 
 WAVES = {f"{k} half waves": float(k) for k in (1, 2, 3, 4)}
 """Forms of moments along the cable, and the number of their half waves."""
@@ -52,6 +53,7 @@ class _Unknown(Cause):
     """
 
     seat = "rig"
+    adds = True
     places: ClassVar[dict[str, tuple[str, ...]]]
 
     def chance(self, variant: Variant, facts: Facts) -> float:
@@ -62,13 +64,7 @@ class _Unknown(Cause):
     def ways(self, facts: Facts, labels: Sequence[str], size: float) -> tuple[Term, ...]:
         """The terms of forces or moments at all of these places together, of one of `SIZES`."""
         orders = range(len(facts.branch))
-        known = {(label, o): size * WAVES.get(label, 1.0) ** -2.0 / (1 + o) for o in orders for label in labels}
-        return tuple(Term(self, Variant(label, at=float(o), known=std)) for (label, o), std in known.items())
-
-    @staticmethod
-    def place_of(terms: Sequence[Term]) -> tuple[str, ...]:
-        """Where forces or moments act, as in `places`."""
-        return tuple(dict.fromkeys(term.variant.label for term in terms))
+        return of_size([Term(self, Variant(label, at=float(o))) for o in orders for label in labels], size)
 
     def freer(self, terms: Sequence[Term]) -> Iterator[tuple[Term, ...]]:
         """The same ones with more beside them; none where there is no more."""
@@ -110,7 +106,7 @@ class UnknownMoments(_Unknown):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Bend an end of the cable by ``amount``, as its course says."""
         more = amount * np.outer(self.course(variant, facts), np.array(["left", "right"]) == variant.label)
-        return with_more(model, "moments_by_step", more)
+        return _acting(model, variant, "moments_by_step", more)
 
 
 class UnknownBends(_Unknown):
@@ -127,7 +123,7 @@ class UnknownBends(_Unknown):
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
         """Move the rest by ``amount`` along a half wave, as its course says."""
         wave = np.sin(WAVES[variant.label] * np.pi * joints(model))
-        return with_more(model, "grown", np.outer(amount * self.course(variant, facts), wave))
+        return _acting(model, variant, "grown", np.outer(amount * self.course(variant, facts), wave))
 
 
 class UnknownForces(_Unknown):
@@ -155,7 +151,7 @@ class UnknownForces(_Unknown):
         """Push the cable by ``amount``, as its course says."""
         force = np.outer(amount * self.course(variant, facts), _at(POINTS[variant.label], joints(model)))
         way = np.array([1.0, 0.0] if variant.setting == ALONG else [0.0, 1.0])
-        return with_more(model, "forces_by_step", force[:, :, None] * way)
+        return _acting(model, variant, "forces_by_step", force[:, :, None] * way)
 
 
 class UnknownReadings(_Unknown):
@@ -265,6 +261,34 @@ def carried_over(terms: Sequence[Term], known: Sequence[Term], amounts: Array, f
         made = sum((amounts[k] * course_of(known[k]) for k in old), np.zeros(len(facts.branch)))
         start[own] = np.linalg.lstsq(np.column_stack([course_of(terms[k]) for k in own]), made, rcond=None)[0]
     return start
+
+
+def _acting(model: Model, variant: Variant, name: str, more: Array) -> Model:
+    """`with_more`; where it acts from the first step on, the cable was mounted under it, and lies free of the bearings."""
+    known = model if variant.width else replace(model, bending=replace(model.bending, zero="loaded"))
+    return with_more(known, name, more)
+
+
+def _weight(term: Term) -> float:
+    """Standard deviation of an amount for one of the size, by its order and its half waves."""
+    return WAVES.get(term.variant.label, 1.0) ** -2.0 / (1.0 + term.variant.at)
+
+
+def of_size(terms: Sequence[Term], size: float) -> tuple[Term, ...]:
+    """Forces or moments of another size; where they act stays as it is known."""
+    return tuple(
+        term if term.cause is PLACE else term._replace(variant=replace(term.variant, known=size * _weight(term)))
+        for term in terms
+    )
+
+
+def size_told(fitted: Fit) -> float:
+    """Which of `SIZES` the amounts that were fitted have, in the mean of their squares."""
+    at = [k for k, term in enumerate(fitted.extension.terms) if term.cause is not PLACE]
+    terms, amounts = [fitted.extension.terms[k] for k in at], np.array([fitted.amount(k) for k in at])
+    unit = np.array([_weight(term) * term.cause.plausible(fitted.extension.facts) for term in terms])
+    told = np.sqrt(np.mean(np.sum(amounts**2, axis=1) / unit**2))
+    return min(SIZES, key=lambda size: abs(np.log(size / told)))
 
 
 def _at(u: float, joints: Array) -> Array:

@@ -27,6 +27,8 @@ from pipeline.diagnosis.causes.unnamed import (
     UNKNOWN,
     Unknown,
     carried_over,
+    of_size,
+    size_told,
 )
 from pipeline.diagnosis.explanations.candidates import LEAST, candidates, far_behind, hidden_pair
 from pipeline.diagnosis.explanations.forms import SHAPE_GAIN
@@ -236,30 +238,30 @@ class Search:
             self._weigh_unknown(unknown, hopeless)
 
     def _weigh_unknown(self, unknown: Unknown, hopeless: float) -> None:
-        """Forces or moments of one size at each place, where they are likeliest of other sizes, and begins too."""
-        facts, (smaller, first, *larger), base = self.bench.facts, SIZES, self.bench.base
-        everywhere = [*unknown.places.values()]
+        """Forces or moments at each place, then of the size that they say themselves, with more beside, and begins.
 
-        def tried(every: Iterable[tuple[Term, ...]], near: Fit) -> list[Hypothesis]:
+        From a large size down: of a small one a fit stays beside the small forces that a wrong model is content with.
+        """
+        facts, base = self.bench.facts, self.bench.base
+
+        def tried(every: Iterable[tuple[Term, ...]], near: Fit, hopeless: float = np.inf) -> list[Hypothesis]:
             return self._weigh_unnamed((), self._with(every, near, hopeless))
 
-        found = tried((unknown.ways(facts, at, first) for at in everywhere), base)
+        def sized(best: Hypothesis) -> Hypothesis:
+            known, size = best.terms, SIZES[-1]
+            while (told := size_told(_fit_of(best))) < size:
+                size = told
+                best = max([best, *tried([of_size(known, size)], _fit_of(best))], key=attrgetter("rest"))
+            return best
+
+        found = tried((unknown.ways(facts, at, SIZES[-1]) for at in unknown.places.values()), base, hopeless)
         if not found:
             return
-        best, size = max(found, key=attrgetter("rest")), first
-        place = unknown.place_of(best.terms)
-        for other in larger if _beyond(best) else (smaller,):
-            others = tried([unknown.ways(facts, place, other)], _fit_of(best))
-            there = max(others, key=attrgetter("rest"), default=best)
-            if there.rest <= best.rest:
-                break
-            best, size = there, other
-        if size != first:
-            others = tried((unknown.ways(facts, at, size) for at in everywhere if at != place), base)
-            best = max([best, *others], key=attrgetter("rest"))
-        best = max([best, *tried(unknown.freer(best.terms), _fit_of(best))], key=attrgetter("rest"))
+        best = sized(max(found, key=attrgetter("rest")))
+        more = tried((of_size(terms, SIZES[-1]) for terms in unknown.freer(best.terms)), _fit_of(best))
+        best = max([best, *map(sized, more)], key=attrgetter("rest"))
         if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
-            tried(unknown.since(best.terms, facts), _fit_of(best))
+            tried(unknown.since(best.terms, facts), _fit_of(best), hopeless)
 
     def _with(self, every: Iterable[tuple[Term, ...]], near: Fit, hopeless: float) -> Iterator[Fit]:
         """The base model with terms, fitted from a fit ``near`` and from what these terms make alike in it."""
@@ -292,13 +294,6 @@ class Search:
 def _fit_of(one: Hypothesis) -> Fit:
     assert one.found is not None
     return one.found.fitted
-
-
-def _beyond(one: Hypothesis) -> bool:
-    """Whether amounts are larger than was known of them beforehand, in the mean of their squares."""
-    fitted, extension = _fit_of(one), _fit_of(one).extension
-    known = [term.variant.known * term.cause.plausible(extension.facts) for term in extension.terms]
-    return bool(np.mean((fitted.vector[[*extension.amounts_at]] / known) ** 2) > 1.0)
 
 
 def searched(bench: Workbench, known: Refits | None = None) -> Search:

@@ -6,8 +6,6 @@ the sentence on top -> the part of the result.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,9 +65,6 @@ def present(
         ]
         errors += _begun_unseen(accepted.fitted)
         again = identified_again(bench.observation, shown or accepted.fitted, force_errors=errors)
-        if conclusion.unmodelled and not accepted.unnamed:
-            # the nearest cause may not be there at all: without it the data have another answer
-            again = replace(again, other=bench.base)
     extended = None if again is None else curve(again.fitted, covariance=again.covariance, other=again.other)
     causes = named_causes(bench, conclusion, again, extended)
     word = verdict(
