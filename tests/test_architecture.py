@@ -120,7 +120,6 @@ INSIDE = {
         ("midline", "continuation"),
         ("path", "refusal"),
         ("measurement", "side"),
-        ("lay",),
     ],
     "pipeline.vision.render": [
         ("lens", "lighting", "sensor", "sheath"),

@@ -31,7 +31,6 @@ from pipeline.settings.vision import SeriesSettings, VisionSettings
 from pipeline.vision.bearings.covers import VERTICAL_DEG
 from pipeline.vision.bearings.steady import wandering_px
 from pipeline.vision.centerline.axes_of_series import told_by_others
-from pipeline.vision.centerline.lay import without_lay
 from pipeline.vision.centerline.measurement import Followed, follow_cable, waves_of
 from pipeline.vision.centerline.side import on_one_side
 from pipeline.vision.guard import guarded, jointly
@@ -153,7 +152,7 @@ def _told_by(
 def _followed(
     specimen: Specimen, shots: list[Shot], calibration: Calibration, parallax_std: float, settings: VisionSettings
 ) -> tuple[list[Shot], Sequence[Followed | Rejected], tuple[Finding, ...]]:
-    """The cables followed on all photos, without their common lay; those that can be tell the sides of all."""
+    """The cables followed on all photos; those that can be tell the sides of all."""
 
     def follow(found: RoughCable | Rejected) -> Followed | Rejected:
         if isinstance(found, Rejected):
@@ -176,7 +175,7 @@ def _followed(
         moved = doubtful("photo/camera-moved", side=fixed, shift_m=shift / calibration.scale.px_per_m)
         findings = (*findings, moved)
         cables = [cable if isinstance(cable, Rejected) else cable.loosened(wandering, wandering) for cable in cables]
-    return shots, without_lay(cables, specimen.diameter_m), findings
+    return shots, cables, findings
 
 
 def _tied(shots: list[Shot], cables: Sequence[Followed | Rejected], settings: VisionSettings) -> list[Line]:

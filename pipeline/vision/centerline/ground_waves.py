@@ -75,7 +75,7 @@ class Waves:
     length: float = 0.0
 
 
-def edge_waves(photos: Sequence[HalfWidths], *, metres_per_px: float, lay: float = 0.0) -> Waves:
+def edge_waves(photos: Sequence[HalfWidths], *, metres_per_px: float) -> Waves:
     """The waves, not smaller than those that every photo has.
 
     Parameters
@@ -83,15 +83,13 @@ def edge_waves(photos: Sequence[HalfWidths], *, metres_per_px: float, lay: float
     photos
         As in `seen_waves`.
     metres_per_px : m
-    lay : m
-        What all photos err alike for what was taken off them (`pipeline.vision.centerline.lay`).
     """
     photos = [photo for photo in photos if photo.s.size]  # one on which each section lives on one edge tells nothing
     if not photos:
         return Waves()
     seen, least = seen_waves(photos), _LEAST_WAVE_PX * metres_per_px
     reach = median(np.array([np.ptp(photo.s) for photo in photos]))
-    own, common = np.hypot(seen.own, least), np.linalg.norm([seen.common, 0.5 * least, lay])
+    own, common = np.hypot(seen.own, least), np.hypot(seen.common, 0.5 * least)
     return Waves(float(own), float(common), seen.length or 0.04 * reach)  # in the middle of those tried
 
 

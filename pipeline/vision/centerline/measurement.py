@@ -24,7 +24,6 @@ from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
-from pipeline.vision.centerline.curvature import normals
 from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_errors, std_along
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
 from pipeline.vision.centerline.midline import Sections
@@ -59,8 +58,6 @@ class Followed:
     light : (std m, length m)
         Of the light's slow error.
     diameter_m : m or None
-    lay_std : m
-        Of what all photos of a series err alike since their lay was taken off.
     """
 
     rough: RoughCable
@@ -71,7 +68,6 @@ class Followed:
     covariance: Array
     light: tuple[float, float]
     diameter_m: float | None
-    lay_std: float = 0.0
 
     def sight(self) -> AxisSight | None:
         """How the cable passes its axes; None where that cannot be told to others, see `sight_of_axes`."""
@@ -86,26 +82,12 @@ class Followed:
             half *= min(1.0, scatter(self.fit.residual[used], 0.0) / scatter(half, 0.0))
         return HalfWidths(self.fit.s[used], half, self.fit.point_std[used], self.fit.smooth.correlation_length)
 
-    def without(self, wiggle: Array, *, spare: float, lay_std: float) -> Followed:
-        """The cable fitted anew, its sections moved back along their normals by ``wiggle`` (n,) m; see `Wiggle`."""
-        moved = wiggle[:, None] * normals(self.fit.curve.at(self.fit.s)[1])
-        fit = _fit(self.sections, self.chord, self.width, moved=moved)
-        noise = np.sqrt(spare)
-        fit = replace(fit, smooth=replace(fit.smooth, root=noise * fit.smooth.root, sigma=noise * fit.smooth.sigma))
-        covariance = fit.smooth.covariance + slow_errors(fit, *self.light)
-        return replace(self, fit=fit, covariance=covariance, lay_std=lay_std)
-
     def loosened(self, left: float, right: float) -> Followed:
         """The cable with axes whose standard deviations (px) are so large at least."""
         one, other = self.rough.axes
         one, other = replace(one, std_px=max(one.std_px, left)), replace(other, std_px=max(other.std_px, right))
         rough = replace(self.rough, left=one, right=other)
         return replace(self, rough=rough, chord=chord_frame(rough, self.chord.plane, self.chord.axis_parallax_std))
-
-    @property
-    def from_axis(self) -> Array:
-        """Arc lengths (n,) m of the sections from the foot of the left axis."""
-        return np.asarray(self.fit.s - feet_of_axes(self.fit, self.chord)[0][0])
 
     def axis_std(self, fit: CurveFit, feet: Array) -> float:
         """Std (m) of the axes across the chord; ``feet`` are their arc lengths on the curve.
@@ -192,9 +174,9 @@ def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
     return replace(rough, left=left, right=right)
 
 
-def _fit(sections: Sections, chord: ChordFrame, width: Array, *, moved: Array | float = 0.0) -> CurveFit:
-    """Curvature spline through the midline less ``moved`` (n, 2) in the chord frame, ``s = 0`` near the left axis."""
-    points = 0.5 * (chord.to_frame(sections.first) + chord.to_frame(sections.second)) - moved
+def _fit(sections: Sections, chord: ChordFrame, width: Array) -> CurveFit:
+    """Curvature spline through the midline in the chord frame, ``s = 0`` near the left axis."""
+    points = 0.5 * (chord.to_frame(sections.first) + chord.to_frame(sections.second))
     before, after = np.hypot(*(points[[0, -1]] - chord.axes).T)
     s = before + arc_lengths(points)
     std = np.maximum(sections.std, _LEAST_STD_PX) * width / sections.width
@@ -205,8 +187,7 @@ def waves_of(cables: Sequence[Followed | Rejected]) -> Waves:
     """The waves that ground and camera make in the midlines of all photos of a series."""
     followed = [cable for cable in cables if isinstance(cable, Followed)]
     metres = max((median(cable.width / cable.sections.width) for cable in followed), default=0.0)
-    lay = max((cable.lay_std for cable in followed), default=0.0)
-    return edge_waves([cable.half_widths() for cable in followed], metres_per_px=metres, lay=lay)
+    return edge_waves([cable.half_widths() for cable in followed], metres_per_px=metres)
 
 
 def centerline_of(

@@ -30,7 +30,7 @@ def test_the_photo_whose_absence_heals_is_to_blame() -> None:
     assert isinstance(both, Rejected) and "the tracing failed (AssertionError: a zero)" in both.reason
 
 
-@pytest.mark.parametrize("stage", ["told_by_others", "without_lay", "of_one_size", "check_scale"])
+@pytest.mark.parametrize("stage", ["told_by_others", "of_one_size", "check_scale"])
 def test_work_on_all_photos_that_always_breaks_says_why_on_each(
     stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -78,7 +78,6 @@ def test_a_picture_that_cannot_be_shown_is_measured(tmp_path: Path, monkeypatch:
 @pytest.mark.parametrize(
     ("stage", "error"),
     [
-        ("without_lay", AssertionError()),
         ("on_one_side", np.linalg.LinAlgError()),
         ("of_one_size", IndexError()),
         ("from_found", ZeroDivisionError()),
