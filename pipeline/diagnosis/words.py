@@ -41,6 +41,7 @@ def headline(
     causes: Sequence[CausePart],
     explained: float | None,
     change: float | None,
+    beside: float,
     seen: Message,
     left: Message,
 ) -> Message:
@@ -55,6 +56,8 @@ def headline(
         Of the held-out excess misfit.
     change : relative or None
         Root mean square change of f_EI.
+    beside : float
+        Probability of something else besides, told where that is likelier than not.
     seen : Message
         What could have been seen, for ``adequate`` and ``underpowered``.
     left : Message
@@ -68,6 +71,7 @@ def headline(
     effects = {
         "gain": "" if explained is None else Message("diagnosis.gain", share=min(explained, 1.0)),
         "shift": "" if change is None else Message("diagnosis.shift", change=change),
+        "beside": Message("diagnosis.beside", chance=beside) if beside >= 0.5 else "",
     }
     if verdict == "class":
         return Message("diagnosis.class", first=word(causes[0].class_[0]), **found[0], **effects)

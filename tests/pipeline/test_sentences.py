@@ -94,7 +94,7 @@ def test_no_sentence_is_written_into_a_room():
 
 
 SIZES = [(0.00488, 0.00017, "N m"), (0.7, 0.0014, "1/m")]
-FOUND = {"explained": 0.94, "change": 0.2, "seen": free_text(""), "left": free_text("")}
+FOUND = {"explained": 0.94, "change": 0.2, "beside": 0.0, "seen": free_text(""), "left": free_text("")}
 LOUD = {"z": 9.0, "p_adjusted": 0.0, "estimate": 0.0, "std": 1.0, "surviving_fraction": 1.0}
 SEEN = could_have_been_seen(
     [
@@ -125,6 +125,13 @@ def test_an_amount_that_shows_in_one_form_only_is_not_told():
             [["hysteresis"]],
             {"explained": None, "change": 3.704},
             "Der Simulation fehlt: Hysterese (4,88 ± 0,17\u00a0mN m), und f_EI ändert sich um 370 % (Effektivwert).",
+        ),
+        (
+            "named",
+            [["hysteresis"]],
+            {"explained": None, "change": None, "beside": 0.55},
+            "Der Simulation fehlt: Hysterese (4,88 ± 0,17\u00a0mN m); dass daneben etwas anderes wirkt, hat eine "
+            "Wahrscheinlichkeit von 55 %.",
         ),
         (
             "class",

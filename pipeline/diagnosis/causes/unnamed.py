@@ -264,7 +264,7 @@ def carried_over(terms: Sequence[Term], known: Sequence[Term], amounts: Array, f
 
 
 def _acting(model: Model, variant: Variant, name: str, more: Array) -> Model:
-    """`with_more`; where it acts from the first step on, the cable was mounted under it, and lies free of the bearings."""
+    """`with_more`; what acts from the first step on was there at the mounting: zero is the chord under it."""
     known = model if variant.width else replace(model, bending=replace(model.bending, zero="loaded"))
     return with_more(known, name, more)
 

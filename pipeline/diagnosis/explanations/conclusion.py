@@ -60,7 +60,7 @@ def conclusion_of(bench: Workbench, search: Search) -> Conclusion:
     word = believed.word
     if word == "base":
         return Conclusion(believed, search.grid, None, (), unmodelled=False)
-    unmodelled = word == "rest"
+    unmodelled = believed.unexplained
     count = 2 if believed.total(count=2, something_else=False) > believed.total(count=1, something_else=False) else 1
     refits = believed.beside_something_else() if unmodelled else believed.explanations(count=count)
     first = next(iter(refits), None)

@@ -13,8 +13,10 @@ linear model about the base, the mean over the forms of the cause. What acts on 
 (`causes.unnamed`) is something else that is refitted. Ten times another share changes few words: with base 0.8 three
 more real effects of 59 stay silent, with 0.3 three nulls of 36 get a name.
 
-What is said is the likeliest of three: the base model, causes of the catalogue, or something else. Among causes that
-the data make likelier than the base model, the smallest set that holds 95 % of their probability cannot be told apart.
+What is said is something else where that is likelier than not, else the likelier of the base model and causes of the
+catalogue. Beside a cause that is there at 95 % something else is told from 95 % on: below, the cause alone may be all.
+Among causes that the data make likelier than the base model, the smallest set that holds 95 % of their probability
+cannot be told apart.
 """
 
 from __future__ import annotations
@@ -83,10 +85,16 @@ class Posterior:
 
     @property
     def word(self) -> Word:
-        """What is likeliest."""
+        """What is likelier than not, or likelier than the other of base model and causes."""
         base, rest = self.total(count=0, something_else=False), self.total(something_else=True)
-        chances: dict[Word, float] = {"base": base, "causes": 1.0 - base - rest, "rest": rest}
-        return max(chances, key=lambda word: chances[word])
+        return "rest" if rest >= 0.5 else "base" if base >= 1.0 - base - rest else "causes"
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether something else is told: where that is the word; beside a cause that is surely there, surely too."""
+        rest, causes = self.total(something_else=True), {cause for one in self.believed for cause in one.causes}
+        there = (sum(one.probability for one in self.believed if cause in one.causes) for cause in causes)
+        return self.word == "rest" and (rest >= LEVEL or max(there, default=0.0) < LEVEL)
 
     def of(self, cause: int) -> float:
         """Probability of all that hold a cause and nothing else."""

@@ -88,6 +88,7 @@ def present(
         word,
         causes=causes,
         explained=None if gain is None else gain.heldout_excess_removed,
+        beside=conclusion.posterior.total(something_else=True),
         change=change_of_stiffness(bench, accepted, extended, identified),
         seen=could_have_been_seen(seen, len(rows)),
         left=leftover.said,

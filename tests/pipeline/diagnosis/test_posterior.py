@@ -257,12 +257,23 @@ def test_shares_beforehand_sum_to_one():
     assert found.of(3) == pytest.approx(SHARES[1][0] / 18 / whole)
 
 
+@pytest.mark.parametrize(("rest", "told"), [(2.6, False), (6.0, True)])
+def test_beside_a_cause_that_is_surely_there_something_else_must_be_sure_too(rest, told):
+    """It was told at 55 %, and f_EI of a cable with hysteresis, all of whose misfit that removes, was 17 % off."""
+    alone = [Hypothesis((), -50.0, -40.0), Hypothesis((0,), 0.0, rest)]
+    found = posterior(alone, [0, 1])
+    assert found.word == "rest" and found.unexplained is told
+    # of two causes either may be the one: what is there is not known
+    assert posterior([*alone, Hypothesis((1,), 0.0, rest)], [0, 1]).unexplained
+
+
 def test_words():
-    """The likeliest of three decides; names that hold 95 % of what is believed of causes make the class."""
+    """Something else is likelier than not, or one of the others is told; names that hold 95 % make the class."""
     hypotheses = [Hypothesis((), 0.0, -9.0), Hypothesis((0,), 8.0, -9.0), Hypothesis((1,), 7.0, -9.0)]
     found = posterior(hypotheses, [0, 1])
     assert found.word == "causes" and [one.causes for one in found.credible()] == [(0,), (1,)]
     assert posterior([Hypothesis((), 0.0, 4.0), Hypothesis((0,), 1.0, -9.0)], [0]).word == "rest"
+    assert posterior([Hypothesis((), 0.0, 2.5), Hypothesis((0,), 0.0, -9.0)], [0]).word == "base"
     # a pair that holds the likeliest cause says nothing against it: together they are believed more than 95 %
     pair = [*hypotheses[:2], Hypothesis((1,), 5.0, -9.0), Hypothesis((0, 2), 6.4, -9.0)]
     assert [one.causes for one in posterior(pair, [0, 1, 2]).credible()] == [(0,), (0, 2)]

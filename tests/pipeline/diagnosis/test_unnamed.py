@@ -159,6 +159,24 @@ def test_a_cable_that_meets_something(protocol, seed, place, force, along):
     assert error < 0.02 and covered > 0.9
 
 
+def beyond(place, size):
+    """A force at a share of the length: on all of the cable beyond."""
+    return lambda u: size / (1.0 + np.exp((u - place) / 0.01))
+
+
+def test_a_thread_that_pulls_from_the_first_on():
+    """Over a pulley to a weight, the cable mounted under it. It was taken for a table that tilts and a bent cable."""
+    cable, place, force = Cable(), 0.4, 0.35
+    pulled = replace(cable, tow=beyond(place, 0.1), shove=beyond(place, force), tared=True)
+    part, _, _ = among(hidden_test(pulled, PROTOCOLS["loop"], largest=LARGEST, seed=96), "")
+    assert part.verdict == "unexplained" and part.leftover.key == "unnamed.forces", part.headline
+    at, std, _ = part.leftover.values["place"]["values"]["at"]
+    assert at == pytest.approx(place * cable.length, abs=4.0 * std) and std < 0.02 * cable.length
+    size, std, _ = part.leftover.values["size"]
+    assert size == pytest.approx(force, abs=4.0 * std)
+    assert f_error(part.extended, cable)[0] < 0.02
+
+
 def test_a_fit_that_went_astray_is_not_weighed():
     """Residuals of 1e14, of a lever whose fit ran off, left no matrix positive, and the specimen was lost."""
     astray = SimpleNamespace(chi2=1e29, run=SimpleNamespace(prediction=object()))
