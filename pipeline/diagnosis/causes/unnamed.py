@@ -19,6 +19,7 @@ and when it acts.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import ClassVar
@@ -271,7 +272,8 @@ def _acting(model: Model, variant: Variant, name: str, more: Array) -> Model:
 
 def _weight(term: Term) -> float:
     """Standard deviation of an amount for one of the size, by its order and its half waves."""
-    return WAVES.get(term.variant.label, 1.0) ** -2.0 / (1.0 + term.variant.at)
+    waves = WAVES.get(term.variant.label, 1.0)
+    return 1.0 / (waves * waves * (1.0 + term.variant.at))
 
 
 def of_size(terms: Sequence[Term], size: float) -> tuple[Term, ...]:
@@ -287,8 +289,8 @@ def size_told(fitted: Fit) -> float:
     at = [k for k, term in enumerate(fitted.extension.terms) if term.cause is not PLACE]
     terms, amounts = [fitted.extension.terms[k] for k in at], np.array([fitted.amount(k) for k in at])
     unit = np.array([_weight(term) * term.cause.plausible(fitted.extension.facts) for term in terms])
-    told = np.sqrt(np.mean(np.sum(amounts**2, axis=1) / unit**2))
-    return min(SIZES, key=lambda size: abs(np.log(size / told)))
+    told = float(np.sqrt(np.mean(np.sum(amounts**2, axis=1) / unit**2)))
+    return min(SIZES, key=lambda size: abs(math.log(size / told)))
 
 
 def _at(u: float, joints: Array) -> Array:
