@@ -12,19 +12,15 @@ from pipeline.records import LoadStep, Preview, Rejected, Specimen
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.bearings.steady import moved_axes
-from pipeline.vision.centerline.measurement import follow_cable
+from pipeline.vision.centerline.measurement import Followed, follow_cable
 from pipeline.vision.guard import guarded
 from pipeline.vision.judgement import Cable
-from pipeline.vision.median import median
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.preview import reduce_photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.calibration import Calibration
 from pipeline.vision.search.creases import creased
 from pipeline.vision.segmentation import find_cable
-
-_LEAST_BETWEEN_RIMS = 0.95
-"""Of the diameter; the dark lines of the rims lie at the edges and beyond them, nearer ones between highlights."""
 
 
 @dataclass(frozen=True)
@@ -76,22 +72,19 @@ class Search:
         """The cable by what specimen and scale tell, near where a neighbour photo shows it; else by its dark rims."""
         cable = self.expected(step)
         found = self.find_as(photo, cable, near)
-        if cable.diameter_px is None or self._width_of(found) is not None:
+        if cable.diameter_px is None or self._holds(found):
             return found
-        by_rims = self.find_as(creased(photo, cable.diameter_px), cable, near)
-        width = self._width_of(by_rims)
-        return found if width is None or width < _LEAST_BETWEEN_RIMS else by_rims
+        other = self.find_as(creased(photo, cable.diameter_px), cable, near)
+        other = other if isinstance(other, Rejected) else replace(other, by_rims=True)
+        return other if self._holds(other) else found
 
-    def _width_of(self, found: RoughCable | Rejected) -> float | None:
-        """Width over stated diameter of a cable that is measured by the scale known so far; None where it is refused.
-
-        One where no scale is known, for nothing can be measured then.
-        """
+    def _holds(self, found: RoughCable | Rejected) -> bool:
+        """True for a cable that is not refused once it is measured, by the scale that is known so far."""
         if isinstance(found, Rejected) or self.calibration is None:
-            return None if isinstance(found, Rejected) else 1.0
+            return isinstance(found, RoughCable)
         plane, diameter = self.calibration.plane, self.specimen.diameter_m
         followed = guarded(found.image, partial(follow_cable, found, plane=plane, diameter_m=diameter))
-        return None if isinstance(followed, Rejected) else median(followed.width) / diameter
+        return isinstance(followed, Followed)
 
     def find_all(self) -> list[Shot]:
         """All photos, each searched near where the cable was on the one before."""
