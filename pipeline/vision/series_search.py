@@ -19,7 +19,7 @@ from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.preview import reduce_photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.calibration import Calibration
-from pipeline.vision.search.creases import creased
+from pipeline.vision.search.creases import by_creases
 from pipeline.vision.segmentation import find_cable
 
 
@@ -74,9 +74,11 @@ class Search:
         found = self.find_as(photo, cable, near)
         if cable.diameter_px is None or self._holds(found):
             return found
-        other = self.find_as(creased(photo, cable.diameter_px), cable, near)
-        other = other if isinstance(other, Rejected) else replace(other, by_rims=True)
-        return other if self._holds(other) else found
+        for creased in by_creases(photo, cable.diameter_px):
+            other = self.find_as(creased, cable, near)
+            if isinstance(other, RoughCable) and self._holds(replace(other, by_rims=True)):
+                return replace(other, by_rims=True)
+        return found
 
     def _holds(self, found: RoughCable | Rejected) -> bool:
         """True for a cable that is not refused once it is measured, by the scale that is known so far."""
