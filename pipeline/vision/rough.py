@@ -85,6 +85,8 @@ class RoughCable:
         For being a cable, along the path.
     rival : RoughCable or None
         As it is seen in other colours, or with its ground: measured instead, where this one is refused.
+    by_rims : bool
+        Seen by the dark lines along its edges, see `pipeline.vision.search.creases`.
     """
 
     image: str
@@ -102,6 +104,7 @@ class RoughCable:
     goes_on: bool = False
     evidence: Evidence = field(default_factory=Evidence)
     rival: RoughCable | None = None
+    by_rims: bool = False
 
     @property
     def axes(self) -> tuple[Bearing, Bearing]:

@@ -12,12 +12,14 @@ from pipeline.records import LoadStep, Preview, Rejected, Specimen
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.bearings.steady import moved_axes
+from pipeline.vision.centerline.measurement import Followed, follow_cable
 from pipeline.vision.guard import guarded
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, load_photo
 from pipeline.vision.preview import reduce_photo
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.scale.calibration import Calibration
+from pipeline.vision.search.creases import by_creases
 from pipeline.vision.segmentation import find_cable
 
 
@@ -67,8 +69,24 @@ class Search:
         return guarded(photo.name, partial(find_cable, photo, cable=cable, near=near, hints=hints))
 
     def find(self, photo: Photo, step: LoadStep, near: RoughCable | None) -> RoughCable | Rejected:
-        """The cable by what specimen and scale tell, near where a neighbour photo shows it."""
-        return self.find_as(photo, self.expected(step), near)
+        """The cable by what specimen and scale tell, near where a neighbour photo shows it; else by its dark rims."""
+        cable = self.expected(step)
+        found = self.find_as(photo, cable, near)
+        if cable.diameter_px is None or self._holds(found):
+            return found
+        for creased in by_creases(photo, cable.diameter_px):
+            other = self.find_as(creased, cable, near)
+            if isinstance(other, RoughCable) and self._holds(replace(other, by_rims=True)):
+                return replace(other, by_rims=True)
+        return found
+
+    def _holds(self, found: RoughCable | Rejected) -> bool:
+        """True for a cable that is not refused once it is measured, by the scale that is known so far."""
+        if isinstance(found, Rejected) or self.calibration is None:
+            return isinstance(found, RoughCable)
+        plane, diameter = self.calibration.plane, self.specimen.diameter_m
+        followed = guarded(found.image, partial(follow_cable, found, plane=plane, diameter_m=diameter))
+        return isinstance(followed, Followed)
 
     def find_all(self) -> list[Shot]:
         """All photos, each searched near where the cable was on the one before."""

@@ -40,6 +40,9 @@ LIGHT_LENGTH_SHARE = 0.35
 """Of the seen length; correlation length of the light's error: it follows the cable's direction, which turns once from
 end to end; over 135 scenes 0.35 was likelier than 0.25 and 0.5.
 """
+_ONE_SIDED = 0.29
+"""Of the width between rims beyond the diameter, the midline's standard deviation: any share of it may lie at one side.
+"""
 _LEAST_STD_PX = 1e-3  # of a section: drawn pictures without noise must not count as infinitely certain
 
 
@@ -133,6 +136,9 @@ def _in_its_colours(
     sections = follow(rough, half_width=half_width, known=diameter_m is not None)
     if isinstance(sections, Rejected):
         return sections
+    if rough.by_rims:
+        wider = _ONE_SIDED * abs(sections.caliper - 2.0 * half_width)
+        sections = replace(sections, systematic_std=float(np.hypot(sections.systematic_std, wider)))
     chord = chord_frame(rough, plane, axis_parallax_std)
     width = np.hypot(*(chord.to_frame(sections.second) - chord.to_frame(sections.first)).T)
     fit = _fit(sections, chord, width)

@@ -23,6 +23,7 @@ from pipeline.vision.search.border import soft_beside_sharp
 
 _BESIDE_COVER = 0.5  # radii; flanks, shadows and stripes pass a cover's axis by 0.85 and more, a cable by a tenth
 _BESIDE_DOUBTED = 1.0  # radii; a cover that is not surely seen may lie elsewhere, but the cable runs over its axis
+_LEAST_BETWEEN_RIMS = 0.95  # diameters; a rim's dark line lies at the edge or beyond, nearer ones between highlights
 _BEND = 0.5  # curvature times diameter; on a radius of two diameters a cable kinks, a curve led astray bends
 
 
@@ -50,7 +51,7 @@ def refusal(
     told = (
         (None if evidence.enough else unlike_a_cable(evidence))
         or _soft(rough, sections)
-        or _another_width(whole, diameter, scale * sections.softest)
+        or _another_width(whole, diameter, scale * sections.softest, by_rims=rough.by_rims)
         or _beside_cover(rough, fit, chord, middle)
         or _bent(fit, middle)
     )
@@ -62,9 +63,11 @@ def _soft(rough: RoughCable, sections: Sections) -> Message | None:
     return Message("photo/outline.soft") if soft else None
 
 
-def _another_width(middle: float, diameter: float | None, blur: float) -> Message | None:
+def _another_width(middle: float, diameter: float | None, blur: float, *, by_rims: bool) -> Message | None:
+    if diameter is None:
+        return None
     # blur moves edges by a part of itself
-    off = diameter is not None and abs(middle - diameter) > WIDTH_OFF * diameter + blur
+    off = abs(middle - diameter) > WIDTH_OFF * diameter + blur or (by_rims and middle < _LEAST_BETWEEN_RIMS * diameter)
     return Message("photo/width.traced") if off else None
 
 
