@@ -27,9 +27,11 @@ def test_cable_as_bright_as_its_ground_is_traced_by_its_rims(tmp_path: Path, gre
     cv2.imwrite(str(file), picture.pixels)
     step = LoadStep(0, "loading", 0.0, 1.0, 0.01, None, np.empty(0), np.empty(0), file.name)
     rig, images = RigSpec("left", COVER), {file.name: file}
-    (line,) = trace_series(
+    traces = trace_series(
         Specimen("a", tmp_path, LENGTH, DIAMETER, CameraSpec(SCALE), rig, (step,), images), VisionSettings()
-    ).photos
+    )
+    (line,) = traces.photos
+    assert "photo/rims" in {finding.code for finding in traces.findings}
     assert isinstance(line, Centerline), line.reason
     dense = np.linspace(0, 1, 8001)
     true = np.column_stack([np.interp(dense, np.linspace(0, 1, len(w)), w) for w in (picture.u_px, picture.v_px)])
