@@ -283,7 +283,7 @@ def test_an_effect_outside_the_catalogue_is_unexplained(alien):
     assert {"sticking": "forces"}.get(alien, "shapes") in part.leftover.message
 
 
-@pytest.mark.parametrize("alien", ["waves", "bump", "sticking"])
+@pytest.mark.parametrize("alien", ["waves", "sticking"])
 def test_f_beside_something_unexplained_is_that_of_the_cable(alien):
     """A cause that is surely there is in the answer, whatever is beside it: without the drift f_EI is 23 % another."""
     test = hidden_test(Cable(), SIX, largest=LARGEST, seed=9, reading=Reading(force_drift=2e-3))

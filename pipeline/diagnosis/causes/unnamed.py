@@ -11,7 +11,7 @@ bends           all along the cable, by moments in half waves: loads of one to f
                 bends the cable as a rest that is moved by M / f_EI does, and is told as that curvature
 readings        on the load cell alone: a spring, a bellows or a stop beside the cable, which bears or adds a force
 
-Or the cable ends beside the axis of its bearing (`Lever`), as photos show, and the force bends it by that.
+Or the cable ends beside the axis of its bearing (`lever`), as photos show, and the force bends it by that.
 
 None has a name in the catalogue, so what it explains is something else; but f_EI beside it can be told, and where
 and when it acts.
@@ -27,6 +27,7 @@ from typing import ClassVar
 import numpy as np
 
 from pipeline.diagnosis.causes.begun import BEGUN, SHARE, Begun, joints, with_more
+from pipeline.diagnosis.causes.lever import LEVER, Lever
 from pipeline.records import Array
 from rod.inverse.cause import Cause, Variant
 from rod.inverse.extension import Term
@@ -214,40 +215,6 @@ class PlaceOfForce(Cause):
         return replace(model, bending=replace(model.bending, forces_by_step=moved))
 
 
-class Lever(Cause):
-    """The cable ends beside the axis of a bearing, on an arm across it that turns with it: the force has a lever there.
-
-    The arm is a rigid piece before a corner of the cable. ``width`` is 1 where it ends toward the bow, -1 where away.
-    """
-
-    name = "unnamed.lever"
-    unit = "m"
-    seat = "rig"
-    sign = 1
-
-    def plausible(self, facts: Facts) -> float:
-        """Half a percent of the length: a millimetre of 0.2 m."""
-        return 5e-3 * facts.length
-
-    def chance(self, variant: Variant, facts: Facts) -> float:
-        """As likely beforehand as one thing that begins."""
-        return SHARE / len(BEGUN) / len(self.variants(facts))
-
-    def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """At either bearing, to either side."""
-        return tuple(Variant(side, width=way) for side in ("left", "right") for way in (1.0, -1.0))
-
-    def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Let the cable end ``amount`` beside an axis."""
-        bending, arm, left = model.bending, max(amount, 0.0), variant.label == "left"
-        end, count = bending.left if left else bending.right, len(joints(model))
-        half_element = 0.5 * bending.rod.free_length / (count - 1)
-        corner = variant.width * 0.5 * np.pi / half_element * (np.arange(count) == (0 if left else count - 1))
-        moved = replace(bending, length=bending.length + arm, pre_curvature=bending.rod.section.pre_curvature + corner)
-        longer = replace(end, rigid_length=end.rigid_length + arm)
-        return replace(model, bending=replace(moved, left=longer) if left else replace(moved, right=longer))
-
-
 def carried_over(terms: Sequence[Term], known: Sequence[Term], amounts: Array, facts: Facts) -> Array:
     """Amounts (k,) of terms that make what others of given ``amounts`` make at each step; none of what these lack."""
 
@@ -299,7 +266,7 @@ def _at(u: float, joints: Array) -> Array:
     return np.asarray(np.maximum(1.0 - np.abs(joints - inside) / joints[1], 0.0))
 
 
-PLACE, LEVER = PlaceOfForce(), Lever()
+PLACE = PlaceOfForce()
 Unknown = UnknownMoments | UnknownForces | UnknownBends | UnknownReadings
 UNKNOWN: tuple[Unknown, ...] = (UnknownMoments(), UnknownForces(), UnknownBends(), UnknownReadings())
 UNNAMED: tuple[Begun | _Unknown | PlaceOfForce | Lever, ...] = (*BEGUN, LEVER, *UNKNOWN, PLACE)

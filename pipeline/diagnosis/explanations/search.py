@@ -21,8 +21,8 @@ from operator import attrgetter
 import numpy as np
 
 from pipeline.diagnosis.causes.begun import BEGUN
+from pipeline.diagnosis.causes.lever import LEVER
 from pipeline.diagnosis.causes.unnamed import (
-    LEVER,
     SIZES,
     UNKNOWN,
     Unknown,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.diagnosis.causes.begun import BEGUN
-from pipeline.diagnosis.causes.unnamed import LEVER, PLACE, POINTS, UNKNOWN
+from pipeline.diagnosis.causes.lever import LEVER
+from pipeline.diagnosis.causes.unnamed import PLACE, POINTS, UNKNOWN
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.maps import across_cable
 from pipeline.diagnosis.fits.workbench import Workbench

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.diagnosis.causes.begun import BEGUN
+from pipeline.diagnosis.causes.lever import LEVER
 from pipeline.diagnosis.causes.load_cell import Relaxation, lost_unseen
-from pipeline.diagnosis.causes.unnamed import LEVER, UnknownForces, UnknownMoments, UnknownReadings
+from pipeline.diagnosis.causes.unnamed import UnknownForces, UnknownMoments, UnknownReadings
 from pipeline.diagnosis.explanations.conclusion import Conclusion
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.heldout import measured_gain
