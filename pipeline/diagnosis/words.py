@@ -68,10 +68,10 @@ def headline(
     if verdict == "unexplained":
         return Message("diagnosis.unexplained", left=left)
     found = [{"names": map(word, part.class_), "size": part.stated} for part in causes]
+    shift = "" if change is None else Message("diagnosis.shift", change=change)
     effects = {
         "gain": "" if explained is None else Message("diagnosis.gain", share=min(explained, 1.0)),
-        "shift": "" if change is None else Message("diagnosis.shift", change=change),
-        "beside": Message("diagnosis.beside", chance=beside) if beside >= 0.5 else "",
+        "shift": Message("diagnosis.beside", shift=shift, chance=beside) if beside >= 0.5 else shift,
     }
     if verdict == "class":
         return Message("diagnosis.class", first=word(causes[0].class_[0]), **found[0], **effects)
