@@ -76,8 +76,8 @@ class Search:
             return found
         for creased in by_creases(photo, cable.diameter_px):
             other = self.find_as(creased, cable, near)
-            if isinstance(other, RoughCable) and self._holds(replace(other, by_rims=True)):
-                return replace(other, by_rims=True)
+            if isinstance(other, RoughCable) and self._holds(seen := replace(other, by_rims=True)):
+                return seen
         return found
 
     def _holds(self, found: RoughCable | Rejected) -> bool:
