@@ -46,10 +46,10 @@ def find_cables(
     moved = guarded("", partial(found_moving, search, shots))  # where it breaks on a photo, the rest stays found
     shots, old = shots if isinstance(moved, Rejected) else moved, shots
     count = sum(new is not shot for new, shot in zip(shots, old, strict=True))
-    found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
-    rims = sum(isinstance(shot.found, RoughCable) and shot.found.by_rims for shot in found)
+    rims = sum(isinstance(shot.found, RoughCable) and shot.found.by_rims for shot in shots)
     how = ("photo/still-ground", count), ("photo/rims", rims)
     told = tuple(inferred(code, count=number) for code, number in how if number)
+    found = [shot for shot in shots if isinstance(shot.found, RoughCable)]
     if rig.marker_diameter_m is not None or rig.bearings_px is not None or not found:
         return shots, told
     most = settings.series.max_length_deviation
