@@ -144,8 +144,8 @@ def test_a_cable_that_meets_something(protocol, seed, place, force, along):
     A post without friction pushes along the normal of the cable, which leans there, and harder than the bearings do.
     """
     cable = Cable()
-    beyond = [lambda u, size=size: size / (1.0 + np.exp((u - place) / 0.01)) for size in (along, force)]
-    test = changed(cable, replace(cable, tow=beyond[0], shove=beyond[1]), protocol, 4, seed=seed)
+    touched = replace(cable, tow=beyond(place, along), shove=beyond(place, force))
+    test = changed(cable, touched, protocol, 4, seed=seed)
     part, _, _ = among(test, "")
     assert part.verdict == "unexplained" and part.leftover.key == "unnamed.forces", part.headline
     assert part.next_experiment.key == "next.look"
