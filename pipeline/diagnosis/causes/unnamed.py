@@ -244,7 +244,7 @@ def _weight(term: Term) -> float:
 
 
 def of_size(terms: Sequence[Term], size: float) -> tuple[Term, ...]:
-    """Forces or moments of another size; where they act stays as it is known."""
+    """Forces or moments with amounts known to be of a size; where they act stays as it is known."""
     return tuple(
         term if term.cause is PLACE else term._replace(variant=replace(term.variant, known=size * _weight(term)))
         for term in terms
