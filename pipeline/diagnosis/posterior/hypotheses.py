@@ -14,7 +14,7 @@ linear model about the base, the mean over the forms of the cause. What acts on 
 more real effects of 59 stay silent, with 0.3 three nulls of 36 get a name.
 
 What is said is something else where that is likelier than not, else the likelier of the base model and causes of the
-catalogue. Beside a cause that is there at 95 % something else is told from 95 % on: below, the cause alone may be all.
+catalogue. Beside causes each of which is there at 95 % something else is told from 95 % on: below, these may be all.
 Among causes that the data make likelier than the base model, the smallest set that holds 95 % of their probability
 cannot be told apart.
 """
@@ -91,10 +91,11 @@ class Posterior:
 
     @property
     def unexplained(self) -> bool:
-        """Whether something else is told: where that is the word; beside a cause that is surely there, surely too."""
-        rest, causes = self.total(something_else=True), {cause for one in self.believed for cause in one.causes}
-        there = (sum(one.probability for one in self.believed if cause in one.causes) for cause in causes)
-        return self.word == "rest" and (rest >= LEVEL or max(there, default=0.0) < LEVEL)
+        """Whether something else is told: where that is the word; beside causes that are surely there, surely too."""
+        alone = next((one.causes for one in self.believed if one.causes and not one.something_else), ())
+        there = [sum(one.probability for one in self.believed if cause in one.causes) for cause in alone]
+        rest = self.total(something_else=True)
+        return self.word == "rest" and (rest >= LEVEL or min(there, default=0.0) < LEVEL)
 
     def of(self, cause: int) -> float:
         """Probability of all that hold a cause and nothing else."""

@@ -263,6 +263,9 @@ def test_beside_a_cause_that_is_surely_there_something_else_must_be_sure_too(res
     alone = [Hypothesis((), -50.0, -40.0), Hypothesis((0,), 0.0, rest)]
     found = posterior(alone, [0, 1])
     assert found.word == "rest" and found.unexplained is told
+    # one of a pair is surely there, the other is not
+    pair = [*alone[:1], Hypothesis((0, 1), 0.0, 4.0), Hypothesis((0,), -5.0, 2.0)]
+    assert posterior(pair, [0, 1]).unexplained
     # of two causes either may be the one: what is there is not known
     assert posterior([*alone, Hypothesis((1,), 0.0, rest)], [0, 1]).unexplained
 
