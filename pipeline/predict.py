@@ -21,15 +21,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from pipeline.identified_model import IdentifiedModel, Zero, identified_model
 from pipeline.messages import Message, ended, word
-from pipeline.records import Finding, doubtful, inferred
+from pipeline.records import Array, Finding, doubtful, inferred
 from pipeline.result import CausePart, Result
 from pipeline.result.visited import html_table
 from pipeline.rounding import plain
@@ -38,7 +37,6 @@ from rod.bending_test import BendingTest, simulate
 from rod.equilibrium import Equilibrium
 from rod.sensitivity import derivatives
 
-Array = NDArray[np.float64]
 Status = Literal["predicted", "extrapolated", "refused", "no equilibrium"]
 
 DIFFERENCE = 0.1
@@ -267,7 +265,7 @@ def _step(
         if not extrapolate:
             return PredictedStep(displacement, "refused", said, chord_m=step.chord, kappa_max_per_m=sharpest)
         status = "extrapolated"
-    return replace(_with_bands(test, model, path), displacement_m=displacement, status=status, said=said)
+    return PredictedStep(displacement, status, said, **_with_bands(test, model, path))
 
 
 def _explained(step: PredictedStep, limit: float | None) -> PredictedStep:
@@ -283,8 +281,8 @@ ALONG = {"x": "m", "y": "m", "theta": "rad", "kappa": "per_m"}
 BANDED = ("force", *ALONG)
 
 
-def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...]) -> PredictedStep:
-    """Force and shape of the last equilibrium of a path with standard deviations to first order."""
+def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...]) -> dict[str, Any]:
+    """Force and shape of the last equilibrium of a path with standard deviations to first order, by field."""
     step, by = path[-1], derivatives(test, path, ["ordinates", "pre_curvature"])[-1]
     law = model.factor_of_test()
     causes = _by_causes(test, model, path)
@@ -295,63 +293,43 @@ def _with_bands(test: BendingTest, model: IdentifiedModel, path: tuple[Equilibri
             columns = columns + changes[name] @ rows
         return np.asarray(np.linalg.norm(columns, axis=-1))
 
-    return PredictedStep(
-        displacement_m=0.0,
-        status="predicted",
-        chord_m=step.chord,
-        force_N=step.force,
-        force_std_N=float(std("force")),
-        kappa_max_per_m=float(step.kappa.max()),
-        s_m=step.s.tolist(),
+    return {
+        "chord_m": step.chord,
+        "force_N": step.force,
+        "force_std_N": float(std("force")),
+        "kappa_max_per_m": float(step.kappa.max()),
+        "s_m": step.s.tolist(),
         **{f"{name}_{unit}": getattr(step, name).tolist() for name, unit in ALONG.items()},
         **{f"{name}_std_{unit}": std(name).tolist() for name, unit in ALONG.items()},
-    )
+    }
 
 
 def _by_causes(
     test: BendingTest, model: IdentifiedModel, path: tuple[Equilibrium, ...]
 ) -> list[tuple[Array, dict[str, Array]]]:
     """For every form of a cause its rows of the factor (q, r), and what moves by name, (..., q) per unit."""
-    found = []
+    found, here = [], path[-1]
     displacements = [test.zero_chord - step.chord for step in path]
     for place, form in enumerate(model.forms):
         rows, columns = [], []
-        for row, std in enumerate(form.std):
-            moved = form.moved(row, DIFFERENCE * std)
-            other = replace(model, forms=(*model.forms[:place], moved, *model.forms[place + 1 :]))
-            there = _again(test, other, displacements, path)
-            if std > 0.0 and there is not None:
+        for row, by in enumerate(DIFFERENCE * form.std):
+            forms = (*model.forms[:place], form.moved(row, by), *model.forms[place + 1 :])
+            cable = replace(model, forms=forms).bending_test(test.length, elements=here.rod.edges.size - 2)
+            there = simulate(replace(cable, zero=test.zero), displacements, branch="up", starts=path)[-1]
+            if by > 0.0 and there.good:
                 rows.append(form.factor[row])
-                columns.append(_difference(path[-1], there, DIFFERENCE * std))
+                columns.append({name: (getattr(there, name) - getattr(here, name)) / by for name in BANDED})
         if rows:
             found.append((np.array(rows), {name: np.stack([c[name] for c in columns], axis=-1) for name in BANDED}))
     return found
 
 
-def _again(
-    test: BendingTest, model: IdentifiedModel, displacements: list[float], path: tuple[Equilibrium, ...]
-) -> Equilibrium | None:
-    """Last step of the same test of another cable; None where it has no equilibrium."""
-    other = model.bending_test(test.length, elements=path[0].rod.edges.size - 2)
-    other = replace(other, zero=test.zero)
-    step = simulate(other, displacements, branch="up", starts=path)[-1]
-    return step if step.good else None
-
-
-def _difference(here: Equilibrium, there: Equilibrium, by: float) -> dict[str, Array]:
-    return {name: (np.asarray(getattr(there, name)) - np.asarray(getattr(here, name))) / by for name in BANDED}
-
-
 def _findings(result: Result, model: IdentifiedModel) -> list[Finding]:
     """What a reader of the prediction must know about the model it was made with."""
-    found = []
-    if model.method == "balance":
-        found.append(doubtful("predict/balance"))
-    diagnosis = result.diagnosis
-    if diagnosis is not None and diagnosis.causes:
-        found.extend(_about_causes(diagnosis.causes, model))
-    if diagnosis is not None and diagnosis.verdict == "unexplained":
-        found.append(doubtful("predict/unexplained"))
+    found = [doubtful("predict/balance")] if model.method == "balance" else []
+    if (diagnosis := result.diagnosis) is not None:
+        found += _about_causes(diagnosis.causes, model)
+        found += [doubtful("predict/unexplained")] if diagnosis.verdict == "unexplained" else []
     return found
 
 
