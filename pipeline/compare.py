@@ -19,16 +19,13 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from pipeline.identify.contrast import LogCurve, p_value, parts_difference
 from pipeline.messages import Message
-from pipeline.records import Finding, doubtful, inferred
+from pipeline.records import Array, Finding, doubtful, inferred
 from pipeline.result import Result, Visited, leading
 from pipeline.result.visited import html_table
-
-Array = NDArray[np.float64]
 
 # Findings of a measurement that make its scale, length or fit doubtful, and so a comparison with it; besides them the
 # one that comes before all its numbers.
