@@ -87,10 +87,16 @@ def assemble(
     parts = identification_parts(identification)
     wider = None if diagnosis is None else diagnosis.widening
     fitted = parts.inverse.converged
-    measured = parts.inverse.converged or parts.balance.curve is not None
     result = Result(
-        status="measured" if parts.inverse.converged else "partial" if measured else "failed",
-        specimen=_specimen_part(specimen),
+        status="measured" if fitted else "partial" if parts.balance.curve is not None else "failed",
+        specimen=SpecimenPart(
+            id=specimen.id,
+            length_m=specimen.length_m,
+            diameter_m=specimen.diameter_m,
+            folder=str(specimen.folder),
+            moving_bearing=specimen.rig.moving_bearing,
+            description=specimen.description,
+        ),
         scale=ScalePart(
             px_per_mm=traces.scale.px_per_m / 1e3,
             std_relative=traces.scale.std_relative,
@@ -155,17 +161,6 @@ def _gathered(
     return [FindingPart.of(f.level, f.said, code=f.code) for f in found]
 
 
-def _specimen_part(specimen: Specimen) -> SpecimenPart:
-    return SpecimenPart(
-        id=specimen.id,
-        length_m=specimen.length_m,
-        diameter_m=specimen.diameter_m,
-        folder=str(specimen.folder),
-        moving_bearing=specimen.rig.moving_bearing,
-        description=specimen.description,
-    )
-
-
 def photo_parts(specimen: Specimen, traces: Traces, parts: IdentificationParts) -> list[PhotoPart]:
     """One part per photo of the log: traced, rejected or missing."""
     outcomes = {photo.image: photo for photo in traces.photos}
@@ -209,17 +204,15 @@ MEASURED = (
 
 def _photo_part(step: LoadStep, photo: Centerline | Rejected | None, residual: PhotoResidual | None) -> PhotoPart:
     image = str(step.image)
-    if photo is None:
-        said = Message("photo/missing.part")
-        return PhotoPart(image=image, step=step.step, status="missing", code=said.code, **PhotoPart.told(said))
-    if isinstance(photo, Rejected):
+    if not isinstance(photo, Centerline):
+        said = Message("photo/missing.part") if photo is None else photo.said
         return PhotoPart(
             image=image,
             step=step.step,
-            status="rejected",
-            code=photo.code,
-            **PhotoPart.told(photo.said),
-            preview=_preview_part(photo.preview),
+            status="missing" if photo is None else "rejected",
+            code=said.code,
+            **PhotoPart.told(said),
+            preview=None if photo is None else _preview_part(photo.preview),
         )
     shape = photo.shape
     along = {"s_m": shape.s, "x_m": shape.x, "y_m": shape.y, "theta_rad": shape.theta, "kappa_per_m": shape.kappa}
