@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pipeline.cli.options import POSITIVE, chosen_settings, settings_options
-from pipeline.cli.run import found, nothing_found
+from pipeline.cli.run import found
 from pipeline.cli.speech import entry, say, told
 from pipeline.cli.spoken import Spoken
 from pipeline.messages import Message
@@ -32,9 +32,7 @@ def check(ctx: click.Context, folders: tuple[Path, ...], timeout: float | None, 
     """Read specimens and look at their photos without measuring; print what would run and what is wrong, and where."""
     limit = () if timeout is None else (f"batch.timeout_s={timeout}",)
     settings = chosen_settings(*limit)
-    specimens, refused = found(folders, settings.intake)
-    if not specimens:
-        ctx.exit(nothing_found(refused))
+    specimens, refused = found(ctx, folders, settings.intake)
     rows = checked_all(specimens, settings)
     failed = sum(not row["runs"] for row in rows)
     wrong = sum(row["status"] == "error" for row in rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,8 +45,6 @@ def compare(ctx: click.Context, a: Path, b: Path, as_json: bool, out: Path | Non
 
 def as_document(comparison: Comparison) -> dict[str, object]:
     """The comparison as plain values and arrays."""
-    from dataclasses import asdict
-
     document = {name: value for name, value in asdict(comparison).items() if name != "said"}
     findings = [finding.document for finding in comparison.findings]
     return document | {"statement": comparison.statement, "findings": findings}

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-import shlex
 import textwrap
 import tomllib
 from collections.abc import Sequence
@@ -100,13 +98,6 @@ def _assign(tables: dict[str, Any], assignment: str) -> None:
     for key in keys[:-1]:
         inner[key] = inner = inner[key] if isinstance(inner.get(key), dict) else {}
     inner[keys[-1]] = value
-
-
-def as_options(file: Path | None, assignments: Sequence[str]) -> str:
-    """The options for the command that reproduces a result, from whichever folder it is run."""
-    options = [] if file is None else [("--settings", str(file.absolute()))]
-    options += [("--set", assignment) for assignment in assignments]
-    return shlex.join(itertools.chain.from_iterable(options))
 
 
 def commented_settings(settings: Settings) -> str:

@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from pipeline.cli.options import language_option
+from pipeline.cli.predict import MISSING
 from pipeline.cli.speech import complaint, note
 from pipeline.cli.spoken import Spoken
 
-MISSING = 3
 NAMES = ("table", "abaqus", "calculix", "mujoco", "pyelastica")
 
 

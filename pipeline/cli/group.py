@@ -12,7 +12,7 @@ import click
 
 from pipeline import __version__
 from pipeline.cli.options import language_option
-from pipeline.cli.speech import note, refuse
+from pipeline.cli.speech import note
 from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
 from pipeline.messages import Message, by_system
@@ -60,7 +60,7 @@ class Commands(Spoken, click.Group):
                 error.show()
             ctx.exit(error.exit_code)
         except InputError as error:
-            refuse(error)
+            note(error.placed)
             ctx.exit(2)
         except KeyboardInterrupt:
             note(Message("cli.interrupted"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -53,8 +54,9 @@ def chosen_settings(*more: str) -> Settings:
 
 
 def chosen_options() -> str:
-    """The options on settings, for the command that reproduces a result."""
-    from pipeline.cli.configuration import as_options
-
+    """The options on settings, for the command that reproduces a result from whichever folder it is run."""
     meta = click.get_current_context().meta
-    return as_options(meta.get(SETTINGS_FILE), meta.get(ASSIGNMENTS, ()))
+    options = ["--settings", str(meta[SETTINGS_FILE].absolute())] if SETTINGS_FILE in meta else []
+    for assignment in meta.get(ASSIGNMENTS, ()):
+        options += ["--set", assignment]
+    return shlex.join(options)

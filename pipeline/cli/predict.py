@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +22,10 @@ if TYPE_CHECKING:
 MISSING = 3
 
 
-def millimetres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> list[float]:
-    """Numbers between commas, of every time the option is given."""
+def metres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> list[float]:
+    """Millimetres between commas, of every time the option is given, in metres."""
     try:
-        return [float(number) for text in texts for number in text.split(",")]
+        return [1e-3 * float(number) for text in texts for number in text.split(",")]
     except ValueError as error:
         raise wrong_use("cli.no-list", text=" ".join(texts)) from error
 
@@ -32,7 +33,7 @@ def millimetres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str
 @click.command(cls=Spoken)
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option(
-    "--displacement-mm", "displacements_mm", required=True, multiple=True, callback=millimetres, metavar="MM[,MM...]"
+    "--displacement-mm", "displacements_m", required=True, multiple=True, callback=metres, metavar="MM[,MM...]"
 )
 @click.option("--length-mm", type=POSITIVE)
 @click.option("--zero", default="natural", show_default=True, type=click.Choice(["natural", "length"]))
@@ -42,14 +43,7 @@ def millimetres(ctx: click.Context, parameter: click.Parameter, texts: tuple[str
 @language_option
 @click.pass_context
 def predict(
-    ctx: click.Context,
-    result: Path,
-    displacements_mm: list[float],
-    length_mm: float | None,
-    zero: Any,
-    extrapolate: bool,
-    as_json: bool,
-    out: Path | None,
+    ctx: click.Context, /, result: Path, length_mm: float | None, as_json: bool, out: Path | None, **asked: Any
 ) -> None:
     """Predict forces and shapes of a new experiment by the model identified in RESULT."""
     from pipeline.predict import predict as predicted
@@ -62,13 +56,7 @@ def predict(
         note(Message("sentences", sentences=[unusable]))
         ctx.exit(MISSING)
     try:
-        prediction = predicted(
-            measured,
-            [1e-3 * d for d in displacements_mm],
-            length_m=None if length_mm is None else 1e-3 * length_mm,
-            zero=zero,
-            extrapolate=extrapolate,
-        )
+        prediction = predicted(measured, length_m=None if length_mm is None else 1e-3 * length_mm, **asked)
     except ValueError as error:
         raise click.UsageError(complaint(error)) from error
     except ArithmeticError as error:
@@ -91,8 +79,6 @@ def predict(
 
 def as_document(prediction: Prediction) -> dict[str, object]:
     """The prediction as plain values."""
-    from dataclasses import asdict
-
     steps = [asdict(step) | {"reason": step.reason} for step in prediction.steps]
     for step in steps:
         del step["said"]

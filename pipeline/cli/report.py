@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pipeline.cli.options import chosen_settings, settings_options
-from pipeline.cli.speech import refuse, told
+from pipeline.cli.speech import note, told
 from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
 from pipeline.messages import Message
@@ -27,6 +27,6 @@ def report(ctx: click.Context, out: Path) -> None:
         drawn += trouble is None
         click.echo(f"{name}: {told(trouble or Message('cli.drawn'))}", err=True)
     if drawn == 0:
-        refuse(InputError(Message("out/no-results"), path=out))
+        note(InputError(Message("out/no-results"), path=out).placed)
         ctx.exit(3)
     click.echo(out / "index.html")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pipeline.cli.options import POSITIVE, chosen_options, chosen_settings, settings_options
-from pipeline.cli.speech import entry, note, refuse, say, told
+from pipeline.cli.speech import entry, note, say, told
 from pipeline.cli.spoken import Spoken
 from pipeline.errors import InputError
 from pipeline.messages import UNREADABLE, Message
@@ -25,32 +25,21 @@ if TYPE_CHECKING:
 @click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False))
 @click.option("--workers", type=click.IntRange(min=1))
 @click.option("--scheduler", metavar="ADDRESS")
-@click.option("--timeout", type=POSITIVE, metavar="SECONDS")
-@click.option("--no-reports", is_flag=True)
+@click.option("--timeout", "timeout_s", type=POSITIVE, metavar="SECONDS")
+@click.option("--no-reports", "reports", is_flag=True, callback=lambda ctx, option, given: "false" if given else None)
 @click.option("--json", "as_json", is_flag=True)
 @settings_options
 @click.pass_context
 def run(
-    ctx: click.Context,
-    folders: tuple[Path, ...],
-    out: Path,
-    workers: int | None,
-    scheduler: str | None,
-    timeout: float | None,
-    no_reports: bool,
-    as_json: bool,
+    ctx: click.Context, /, folders: tuple[Path, ...], out: Path, scheduler: str | None, as_json: bool, **batch: object
 ) -> None:
     """Measure specimens and write their reports."""
     from pipeline.batch import Store, run_batch
     from pipeline.cli.progress import progress
 
-    given = {"batch.workers": workers, "batch.timeout_s": timeout, "batch.reports": "false" if no_reports else None}
-    limits = [f"{name}={value}" for name, value in given.items() if value is not None]
     options = chosen_options()
-    settings = chosen_settings(*limits)
-    specimens, refused = found(folders, settings.intake)
-    if not specimens:
-        ctx.exit(nothing_found(refused))
+    settings = chosen_settings(*(f"batch.{name}={value}" for name, value in batch.items() if value is not None))
+    specimens, refused = found(ctx, folders, settings.intake)
     with progress(len(specimens)) as show:
         tally = run_batch(
             specimens, out, settings, scheduler=scheduler, options=options, on_outcome=show.ended, on_stage=show.doing
@@ -68,8 +57,13 @@ def run(
     ctx.exit(exit_code(tally, len(refused)))
 
 
-def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Path], list[InputError]]:
-    """Specimens in all folders, and what was wrong with folders, which is said on stderr."""
+def found(
+    ctx: click.Context, folders: tuple[Path, ...], settings: IntakeSettings
+) -> tuple[list[Path], list[InputError]]:
+    """Specimens in all folders, and what was wrong with folders, which is said on stderr.
+
+    Without any specimen the command ends: by 2 if a folder does not exist, by 3 if there is nothing in it.
+    """
     from pipeline.batch.orders import quoted
     from pipeline.intake.access import is_folder
     from pipeline.intake.folder import find_specimens, find_undescribed, folders_of_kind, misnamed
@@ -81,7 +75,7 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
             specimens.update(dict.fromkeys(find_specimens([folder], settings)))
         except InputError as error:
             refused.append(error)
-            refuse(error)
+            note(error.placed)
     there = [folder for folder in folders if is_folder(folder)]
     if deep := folders_of_kind("deep", there, settings):
         note(Message("cli.too-deep", levels=settings.search_depth, count=len(deep), first=deep[0]))
@@ -91,12 +85,9 @@ def found(folders: tuple[Path, ...], settings: IntakeSettings) -> tuple[list[Pat
             continue  # said above
         undescribed = Message("cli.undescribed", folder=folder, quoted=quoted(folder))
         note(undescribed if other is None else other.placed)
+    if not specimens:
+        ctx.exit(2 if any(error.code == "folder/missing" for error in refused) else 3)
     return list(specimens), refused
-
-
-def nothing_found(refused: list[InputError]) -> int:
-    """Exit code without any specimen: 2 if a folder does not exist, 3 if there is nothing in it."""
-    return 2 if any(error.code == "folder/missing" for error in refused) else 3
 
 
 def exit_code(tally: Tally, refused: int = 0) -> int:

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 import click
 
-from pipeline.errors import InputError
 from pipeline.messages import Message
 
 LANGUAGE = "cablebend.language"
@@ -43,11 +42,6 @@ def complaint(error: ValueError) -> str:
     """A caller's mistake as a sentence: in the language of the command where it holds a message."""
     said = error.args[0] if error.args and isinstance(error.args[0], Message) else str(error)
     return f"{told(said).rstrip('.')}."
-
-
-def refuse(error: InputError) -> None:
-    """Print what is wrong with a file of the user."""
-    note(error.placed)
 
 
 def columns() -> int | None:
