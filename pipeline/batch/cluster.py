@@ -6,7 +6,6 @@ client in this process only calls out and listens nowhere.
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import queue
 import threading
@@ -46,15 +45,6 @@ def measure_on_cluster(
         yield from _stream(client, orders, stages, interrupted)
 
 
-def _next(ended: queue.SimpleQueue[Future[Outcome]], interrupted: threading.Event) -> Future[Outcome]:
-    """The next future that ended, or KeyboardInterrupt."""
-    while True:
-        if interrupted.is_set():
-            raise KeyboardInterrupt
-        with contextlib.suppress(queue.Empty):
-            return ended.get(timeout=LOOK_S)
-
-
 def _stream(client: Client, orders: Sequence[Order], stages: Stages, interrupted: threading.Event) -> Iterator[Outcome]:
     """Keep a few orders per worker under way.
 
@@ -75,7 +65,12 @@ def _stream(client: Client, orders: Sequence[Order], stages: Stages, interrupted
     for order in itertools.islice(waiting, workers * AT_ONCE):
         hand_out(order)
     while doing:
-        future = _next(ended, interrupted)
+        if interrupted.is_set():
+            raise KeyboardInterrupt
+        try:
+            future = ended.get(timeout=LOOK_S)
+        except queue.Empty:
+            continue
         _, order, started, again = doing.pop(str(future.key))
         trouble = None if future.status == "finished" else future.exception()
         if isinstance(trouble, KilledWorker) and again < ATTEMPTS:
