@@ -45,22 +45,16 @@ class Store:
 
         Raises `InputError` ``out/busy`` if another run holds it, ``out/unwritable`` if it cannot be written.
         """
-        try:
-            self._work("ready").mkdir(parents=True, exist_ok=True)
-            lock = locket.lock_file(str(self.out / WORK / "lock"), timeout=0)
-            lock.acquire()
-        except locket.LockError as error:
-            raise InputError(Message("out/busy"), path=self.out) from error
-        except OSError as error:
-            raise self.unwritable(error) from error
-        try:
+        with contextlib.ExitStack() as held:
             try:
+                self._work("ready").mkdir(parents=True, exist_ok=True)
+                held.enter_context(locket.lock_file(str(self.out / WORK / "lock"), timeout=0))
                 self._resume()
+            except locket.LockError as error:
+                raise InputError(Message("out/busy"), path=self.out) from error
             except OSError as error:
                 raise self.unwritable(error) from error
             yield
-        finally:
-            lock.release()
 
     def _resume(self) -> None:
         """Put in place what is ready, then begin with empty folders of work."""
