@@ -136,17 +136,14 @@ def redraw(out: Path, settings: Settings) -> Iterator[tuple[str, Message | None]
     with store.locked():
         for name in store.names():
             try:
-                result = read_result(store.out / name)
+                draw_again(store, name, read_result(store.out / name), PIPELINE, settings)
             except InputError as error:
                 store.forget_row(name)
                 yield name, Message("cli.unreadable", why=error.said)
-                continue
-            try:
-                draw_again(store, name, result, PIPELINE, settings)
             except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # values that no measurement gives
                 yield name, Message("cli.undrawable", error=type(error).__name__, why=str(error))
-                continue
-            yield name, None
+            else:
+                yield name, None
         PIPELINE.write_index(store.out, settings)
 
 
