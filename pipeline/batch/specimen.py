@@ -218,7 +218,14 @@ def store_failure(order: Order, findings: list[FindingPart], *, trace: str | Non
     ``trace``: where in the program it failed, for the provenance.
     """
     store = Store(order.out)
-    result = failed_result(order, findings, trace)
+    provenance = {"command": order.command, "version": order.version}
+    result = Result(
+        status="failed",
+        headline=findings[0].message,
+        specimen=SpecimenPart(id=order.name, folder=str(order.folder).encode("utf-8", "replace").decode()),
+        findings=findings,
+        provenance=provenance if trace is None else provenance | {"traceback": trace},
+    )
     entry = _entry(order, result, "")
     unstored: dict[str, Any] | None = entry
     with contextlib.suppress(OSError, InputError), store.staging() as staged:
@@ -237,15 +244,3 @@ def store_death(order: Order, told: str, started: float) -> Outcome:
     """
     outcome = store_failure(order, [FindingPart.of("error", Message("specimen/worker-died.told", told=told))])
     return replace(outcome, seconds=time.monotonic() - started)
-
-
-def failed_result(order: Order, findings: list[FindingPart], trace: str | None) -> Result:
-    """The result of a specimen that could not be measured."""
-    provenance = {"command": order.command, "version": order.version}
-    return Result(
-        status="failed",
-        headline=findings[0].message,
-        specimen=SpecimenPart(id=order.name, folder=str(order.folder).encode("utf-8", "replace").decode()),
-        findings=findings,
-        provenance=provenance if trace is None else provenance | {"traceback": trace},
-    )
