@@ -80,7 +80,8 @@ def _row_of(name: str, out: Path, settings: ReportSettings) -> IndexRow:
     try:
         result = read_result(place)
     except InputError as error:
-        result = unreadable(name, error.said)
+        finding = FindingPart.of("error", Message("result/unreadable.index", name=name, why=error.said))
+        result = Result(status="failed", specimen=SpecimenPart(id=name, folder=name), findings=[finding])
     return replace(index_row(result), report=report_of(result, name, out, settings))
 
 
@@ -93,12 +94,6 @@ def _as_entered(path: Path, entered: float) -> bool:
         tail = file.read(TAIL)
     whole = head.lstrip()[:1] == b"{" and SCHEMA.encode() in head and tail.rstrip()[-1:] == b"}"
     return whole and status.st_mtime <= entered + COPIED_S
-
-
-def unreadable(name: str, why: Message) -> Result:
-    """A failed result in the place of a ``result.json`` that cannot be read."""
-    finding = FindingPart.of("error", Message("result/unreadable.index", name=name, why=why))
-    return Result(status="failed", specimen=SpecimenPart(id=name, folder=name), findings=[finding])
 
 
 def report_of(result: Result, folder: str, out: Path, settings: ReportSettings) -> str:
