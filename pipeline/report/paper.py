@@ -96,7 +96,8 @@ def numbers(paper: Paper) -> dict[str, Any]:
     """The contract's ``paper.json``, with more beside it."""
     table: dict[str, Any] = {reading: _row(paper.experiments[reading, False]) for reading in READINGS}
     table |= {f"{reading}_from_length": _row(paper.experiments[reading, True]) for reading in READINGS}
-    causes, together = paper.causes[:-1], paper.causes[-1]
+    *causes, together = paper.causes
+    shares = [*((d, d.share) for d in causes), (together, None)]
     return {
         "table1": table,
         "inverse": {
@@ -119,8 +120,7 @@ def numbers(paper: Paper) -> dict[str, Any]:
             "converged": paper.straight.converged,
             "by_forces_alone_Nm2": paper.straight_by_forces.characteristic.ordinates.tolist(),
         },
-        "disagreement": [{"cause": d.cause, "share": d.share, "rms_relative": d.rms} for d in causes]
-        + [{"cause": together.cause, "share": None, "rms_relative": together.rms}],
+        "disagreement": [{"cause": d.cause, "share": share, "rms_relative": d.rms} for d, share in shares],
         "iteration": [asdict(cost) for cost in paper.iteration],
         "rediscovery": [_discovery(found) for found in paper.discoveries],
     }
@@ -177,36 +177,33 @@ def _found(step: Discovery) -> Message:
 
 
 def _discovery(step: Discovery) -> dict[str, Any]:
-    removed = None if step.gain is None else step.gain.heldout_excess_removed
     return {
         "cause": step.name,
         "data": step.data,
         "chi2": list(step.chi2),
         "chi2_of_others": step.rivals,
-        "heldout_excess_removed": removed,
+        "heldout_excess_removed": None if step.gain is None else step.gain.heldout_excess_removed,
     }
 
 
 def draw(paper: Paper, words: Words) -> list[tuple[str, Drawing]]:
     """Title and figure, in the paper's order."""
-    fills: dict[str, Callable[[Area], Axes]] = {
-        "fig3": partial(draw_shapes, paper.experiments["secant", False], words),
-        "fig4": partial(draw_evolution, paper.inverse, words),
-        "fig5": partial(draw_responses, paper.inverse, words),
-        "fig6": partial(draw_straight, paper.straight_by_forces, paper.straight, paper.inverse, words),
-    }
-    titles = {name: words(f"paper_{name}") for name in fills}
-    for letter, cause in zip("abcd", paper.causes, strict=True):
-        fills[f"fig7{letter}"] = partial(draw_difference, cause, words)
-        titles[f"fig7{letter}"] = words("paper_fig7", cause=_named(cause).said(words.language))
-    # two halves stand one above the other, and a cable is longer than it is high
-    heights = {"fig3": 150.0, "fig4": 560.0, "fig5": 560.0, "fig6": 560.0}
 
-    def drawn(name: str, title: str) -> Drawing:
+    def drawn(name: str, fill: Callable[[Area], Axes], height: float, title: str) -> tuple[str, Drawing]:
         told = {"title": title, "description": words("paper_numbers", title=title)}
-        return drawing(name, fills[name], size=(400.0, heights.get(name, 300.0)), **told)
+        return title, drawing(name, fill, size=(400.0, height), **told)
 
-    return [(title, drawn(name, title)) for name, title in titles.items()]
+    straight = partial(draw_straight, paper.straight_by_forces, paper.straight, paper.inverse, words)
+    figures = [  # two halves stand one above the other, and a cable is longer than it is high
+        drawn("fig3", partial(draw_shapes, paper.experiments["secant", False], words), 150.0, words("paper_fig3")),
+        drawn("fig4", partial(draw_evolution, paper.inverse, words), 560.0, words("paper_fig4")),
+        drawn("fig5", partial(draw_responses, paper.inverse, words), 560.0, words("paper_fig5")),
+        drawn("fig6", straight, 560.0, words("paper_fig6")),
+    ]
+    for letter, cause in zip("abcd", paper.causes, strict=True):
+        title = words("paper_fig7", cause=_named(cause).said(words.language))
+        figures.append(drawn(f"fig7{letter}", partial(draw_difference, cause, words), 300.0, title))
+    return figures
 
 
 def standalone(figure: Drawing) -> str:
