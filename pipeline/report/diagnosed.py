@@ -217,18 +217,13 @@ def _before_and_after(before: ResidualMap, after: ResidualMap, words: Words) -> 
     drawn = {"before": residual_map("map-before", before, words, title="fig_map_before")}
     if any(value is not None for value in before.force_sigma):
         draw = partial(maps.draw_force_rest, before=before, after=after, words=words)
-        texts = _force_texts(before, after, words)
-        drawn["force_rest"] = titled("force-rest", draw, words, key="force_rest", size=(400.0, 240.0), values=texts)
+        left = (
+            "; ".join(NOTHING if value is None else words.number(value, 2) for value in residuals.force_sigma)
+            for residuals in (before, after)
+        )
+        told = " → ".join(filter(None, left))
+        drawn["force_rest"] = titled("force-rest", draw, words, key="force_rest", size=(400.0, 240.0), values=told)
     return drawn
-
-
-def _force_texts(before: ResidualMap, after: ResidualMap, words: Words) -> str:
-    """Forces left over by step, before and after, as text."""
-    parts = (
-        "; ".join(NOTHING if value is None else words.number(value, 2) for value in residuals.force_sigma)
-        for residuals in (before, after)
-    )
-    return " → ".join(filter(None, parts))
 
 
 def _closest(twins: dict[str, dict[str, float]], words: Words) -> str:
