@@ -78,13 +78,9 @@ DRAWN = 24
 
 def repeats(rows: list[IndexRow], unit: Unit, words: Words) -> Iterable[Repeats]:
     """Repeat specimens by type, most specimens first; ``unit`` is that of bending stiffness for all of an index."""
-    drawn = 0
-    for name, group in by_type(rows):
-        together = pool([curve for _, curve in group])
-        if together is None:
-            continue
-        drawn += 1
-        shown = drawn <= DRAWN
+    pools = ((name, group, pool([curve for _, curve in group])) for name, group in by_type(rows))
+    poolable = ((name, group, pooled) for name, group, pooled in pools if pooled is not None)
+    for place, (name, group, together) in enumerate(poolable):
         rests = [rows[number].pre_curvature for number, _ in group]
         known = [rest for rest in rests if rest is not None and rest[1] > 0.0]
         scatters = {"f_EI": together.stiffness} | ({"K0": scattered(known)} if len(known) == len(rests) else {})
@@ -94,7 +90,7 @@ def repeats(rows: list[IndexRow], unit: Unit, words: Words) -> Iterable[Repeats]
             table=tuple(_cells(name, s, unit if name == "f_EI" else PER_M, words) for name, s in scatters.items()),
             pooled=together,
             members=tuple(number for number, _ in group[:LINES]),
-            alt=words("pooled_alt", count=len(group), type=name) if shown else "",
+            alt=words("pooled_alt", count=len(group), type=name) if place < DRAWN else "",
         )
 
 
