@@ -186,17 +186,14 @@ def photo_rows(result: Result, words: Words) -> list[list[str]]:
     millimetres, rows = Unit(1e3, "mm", words.decimal), []
     for photo in result.photos:
         seen = seen_range(photo)
-        lengths = (
-            (photo.chord_m, photo.chord_std_m),
-            (photo.traced_length_m, photo.traced_length_std_m),
-            (photo.width_m, photo.width_std_m),
-        )
         rows.append(
             [
                 str(photo.step),
                 photo.image,
                 words(f"status_{photo.status}") + (f": {words.after_colon(photo.said)}" if photo.reason else ""),
-                *(millimetres.number(value, std) for value, std in lengths),
+                millimetres.number(photo.chord_m, photo.chord_std_m),
+                millimetres.number(photo.traced_length_m, photo.traced_length_std_m),
+                millimetres.number(photo.width_m, photo.width_std_m),
                 "–" if seen is None else f"{words.curvature(seen[0])} … {words.curvature(seen[1])}",
             ]
         )

@@ -212,8 +212,7 @@ def draw_forces(figure: Area, result: Result, words: Words) -> Axes:
         rest = plot_area(figure, top=0.68 * height)
         rest.set_xlim(axes.get_xlim())
         _force_rest(rest, by_branch, words)
-    finish(axes, words, x=under, y=words("axis_force", unit=unit.symbol), legend=2)
-    return axes
+    return finish(axes, words, x=under, y=words("axis_force", unit=unit.symbol), legend=2)
 
 
 def _simulated(axes: Axes, fitted: list[StepPart], unit: Unit, colour: str, words: Words) -> None:
@@ -269,5 +268,4 @@ def draw_curvatures(figure: Area, result: Result, words: Words) -> Axes:
         axes.plot(1e3 * np.asarray(photo.s_m), kappa, color=colour, lw=1.6, label=label)
     if len(traced) > 10:
         axes.set_title(words("steps_dark_to_bright"), loc="left")
-    finish(axes, words, x=words("axis_s"), y=words("axis_kappa"), legend=10 if len(traced) <= 10 else 0)
-    return axes
+    return finish(axes, words, x=words("axis_s"), y=words("axis_kappa"), legend=10 if len(traced) <= 10 else 0)

@@ -130,12 +130,11 @@ def answer_sheet(result: Result, words: Words, settings: ReportSettings) -> Shee
         ]
     if said.hidden:
         parts.append(("hidden_here", " ".join(f"{line[:1].upper()}{line[1:]}" for line in said.hidden)))
+    if said.pre_curvatures:
+        parts.append(("pre_curvature", "; ".join(f"{way}: {value} 1/m" for way, value in said.pre_curvatures)))
     for title, text in parts:
         sheet.text(words(title), bold=True)
         sheet.text(text)
-    if said.pre_curvatures:
-        sheet.text(words("pre_curvature"), bold=True)
-        sheet.text("; ".join(f"{way}: {value} 1/m" for way, value in said.pre_curvatures))
     use = simulation_texts(result, words, settings)
     if use:
         sheet.text(words("nav_use"), bold=True)
@@ -179,8 +178,8 @@ def _mechanics_sheet(result: Result, words: Words) -> Sheet:
         if residuals is not None:
             maps.draw_map(right, residuals, words, title=words("fig_map"))
     unit = figures.force_unit(result, words).symbol
-    heads = [words("col_step"), words("col_branch"), words("col_displacement")]
-    heads += [words(key, unit=unit) for key in ("col_force", "col_force_fit", "col_residual")] + [words("col_sigma")]
+    columns = ("step", "branch", "displacement", "force", "force_fit", "residual", "sigma")
+    heads = [words(f"col_{name}", unit=unit) for name in columns]
     rows = force_rows(result, words)[: max(0, int(sheet.room() / 13.0) - 2)]
     if rows:
         _grid(sheet, heads, rows)

@@ -27,8 +27,7 @@ def overlay_paths(photo: PhotoPart) -> tuple[str, str]:
     """SVG paths (attribute ``d``) of the seen and the extended centerline in px of the preview; empty without any."""
     if photo.preview is None or not photo.u_px:
         return "", ""
-    u = (np.asarray(photo.u_px) + 0.5) / photo.preview.reduction
-    v = (np.asarray(photo.v_px) + 0.5) / photo.preview.reduction
+    u, v = ((np.asarray(px) + 0.5) / photo.preview.reduction for px in (photo.u_px, photo.v_px))
     seen = np.asarray(photo.seen, dtype=bool)
     return _path(u, v, seen), _path(u, v, ~seen)
 
