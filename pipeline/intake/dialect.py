@@ -35,7 +35,6 @@ OTHER_FILES = {b"PK\x03\x04": "excel", b"\xd0\xcf\x11\xe0": "excel", b"%PDF": "p
 POINT = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:,\d{3})+)?(?:\.\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
 COMMA = re.compile(r"[+-]?(?:\d+|\d{1,3}(?:\.\d{3})+)?(?:,\d*)?(?:[eE][+-]?\d{1,3})?", re.ASCII)
 PLAIN = {".": re.compile(r"[+-]?\d+(?:\.\d+)?", re.ASCII), ",": re.compile(r"[+-]?\d+(?:,\d+)?", re.ASCII)}
-EXPONENT = re.compile("[eE]")
 LINE = re.compile(r".*\n?")
 CLOCK_WITH_COMMA = re.compile(r"\d:\d\d,\d+$", re.ASCII)
 INFINITE = ("inf", "-inf", "+inf", "infinity")
@@ -251,9 +250,8 @@ def decimals(cell: str, decimal: Decimal) -> int:
     """Digits behind the decimal sign: the resolution of the log."""
     if PLAIN[decimal].fullmatch(cell):
         return len(cell.partition(decimal)[2])
-    mantissa = EXPONENT.split(smooth(cell), maxsplit=1)
-    shift = int(mantissa[1]) if len(mantissa) > 1 else 0
-    return len(mantissa[0].partition(decimal)[2].strip()) - shift
+    mantissa, _, power = smooth(cell).casefold().partition("e")
+    return len(mantissa.partition(decimal)[2]) - int(power or 0)
 
 
 def column_names(cells: Sequence[str]) -> str:
