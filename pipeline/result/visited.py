@@ -106,7 +106,6 @@ def visited(
     keep = np.flatnonzero(curve.supported)
     if keep.size < 2:
         return None
-
     along = {name: np.asarray(getattr(curve, stored), dtype=np.float64)[keep] for name, stored in STORED.items()}
     kappa, moment, tangent = along["kappa"], along["moment"], along["tangent"]
     rest, rest_std = pre_curvature
@@ -114,11 +113,11 @@ def visited(
         nearest = int(np.argmin(np.abs(moment)))  # the error of zero moment there is that of the moment over f
         rest = float(kappa[nearest] - moment[nearest] / tangent[nearest])
         rest_std = float(along["moment_std"][nearest] / abs(tangent[nearest]))
-    factor = np.asarray(curve.tangent_factor_Nm2, dtype=np.float64)[keep] if curve.tangent_factor_Nm2 else None
+    rows = len(curve.kappa_per_m)
     return Visited(
         method=method,
         **along,
-        factor=np.zeros((keep.size, 0)) if factor is None else factor,
+        factor=np.reshape(np.asarray(curve.tangent_factor_Nm2, dtype=np.float64), (rows, -1))[keep],
         pre_curvature=rest,
         pre_curvature_std=rest_std,
         rest_factor=np.asarray(curve.pre_curvature_factor_per_m, dtype=np.float64),
