@@ -52,7 +52,7 @@ def index_rows(out: Path, settings: ReportSettings) -> list[IndexRow]:
 def write_rows(rows: list[IndexRow], out: Path, settings: ReportSettings) -> tuple[Path, Path]:
     """Write ``index.html`` and ``summary.csv`` of rows into a folder; both paths."""
     page = write_atomic(out / "index.html", index_html(rows, settings))
-    return page, write_atomic(out / "summary.csv", summary_lines(rows))
+    return page, write_atomic(out / "summary.csv", csv_lines(HEADS, map(_summed, rows)))
 
 
 def result_folders(folder: Path) -> list[str]:
@@ -241,12 +241,8 @@ HEADS = (
 )
 
 
-def summary_lines(rows: Iterable[IndexRow]) -> Iterator[str]:
-    """Lines of ``summary.csv``; nothing stands where nothing was measured."""
-    return csv_lines(HEADS, map(_summed, rows))
-
-
 def _summed(row: IndexRow) -> tuple[object, ...]:
+    """A line of ``summary.csv``; nothing stands where nothing was measured."""
     none = (None, None, None)
     rest, ends = row.pre_curvature or (None, None), (*(row.low or none), *(row.high or none))
     told = (row.worst, str(row.fault or row.reason or ""), row.type, row.rms_relative, row.compatible)
