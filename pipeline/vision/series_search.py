@@ -72,21 +72,23 @@ class Search:
         """The cable by what specimen and scale tell, near where a neighbour photo shows it; else by its dark rims."""
         cable = self.expected(step)
         found = self.find_as(photo, cable, near)
-        if cable.diameter_px is None or self._holds(found):
+        if cable.diameter_px is None or self.calibration is None:
             return found
-        for creased in by_creases(photo, cable.diameter_px):
+        followed = self._followed(found, self.calibration)
+        for creased in () if isinstance(followed, Followed) else by_creases(photo, cable.diameter_px):
             other = self.find_as(creased, cable, near)
-            if isinstance(other, RoughCable) and self._holds(seen := replace(other, by_rims=True)):
-                return seen
-        return found
+            if isinstance(other, RoughCable):
+                followed = self._followed(replace(other, by_rims=True), self.calibration)
+            if isinstance(followed, Followed):
+                break
+        return followed.on_midline() if isinstance(followed, Followed) else found
 
-    def _holds(self, found: RoughCable | Rejected) -> bool:
-        """True for a cable that is not refused once it is measured, by the scale that is known so far."""
-        if isinstance(found, Rejected) or self.calibration is None:
-            return isinstance(found, RoughCable)
-        plane, diameter = self.calibration.plane, self.specimen.diameter_m
-        followed = guarded(found.image, partial(follow_cable, found, plane=plane, diameter_m=diameter))
-        return isinstance(followed, Followed)
+    def _followed(self, found: RoughCable | Rejected, known: Calibration) -> Followed | Rejected:
+        """The cable as it is measured by the scale that is known so far."""
+        if isinstance(found, Rejected):
+            return found
+        work = partial(follow_cable, found, plane=known.plane, diameter_m=self.specimen.diameter_m)
+        return guarded(found.image, work)
 
     def find_all(self) -> list[Shot]:
         """All photos, each searched near where the cable was on the one before."""

@@ -4,6 +4,7 @@ Strategy. A smooth path within a few pixels of the midline gives each pixel near
 the path, and across it, positive to the right of the direction of travel as seen on the photo. Pixels are used as they
 are, at their true ``(s, t)``: nothing is interpolated, so errors stay independent and edges keep their blur.
 
+0. `where_alike`: where the path has left the cable for its shadow, what is seen across it is elsewhere beside it.
 1. `search_edges`: on block means of the straightened strip, the pair of gradients that a cable of about the known width
    would show. Searched from the expected edges, so highlights and text on the sheath do not compete.
 2. `fit_profiles`: per side, in windows along s with hundreds of pixels each: the whole edge profile
@@ -35,6 +36,12 @@ from pipeline.vision.search.crosscut import steepest
 SEARCH_RADII = 0.35
 """Of the radius; how far from its expected place an edge is sought: a path misled by a shadow is off by less, the next
 false edge (highlight, text) is mostly farther.
+"""
+
+LOOK_RADII, LOOK_BLOCKS, LOOK_SURE = 1.6, 9, 0.5**0.5
+"""Radii on both sides of a path: the cable with the ground beside it, and as far aside; blocks of half a radius, of
+which most must be seen aside: letters and stripes are shorter than two widths; correlation from which on the look of
+the cable explains more than half of what is seen.
 """
 
 _TOGETHER = 2.0  # scatter of half the width over that of the middle; edges that err each by itself have 1
@@ -83,26 +90,55 @@ def search_edges(
     tolerance : relative
         Of the expected width.
     """
-    block = max(2, round(half_width / 4.0))
-    count = max(8, int((span[1] - span[0]) / block))
-    s = span[0] + (np.arange(count * block) + 0.5) * (span[1] - span[0]) / (count * block)
-    reach = np.ceil(half_width * (1.0 + 2.0 * SEARCH_RADII) + 4.0)
-    t = np.arange(-reach, reach + 1.0)
-    where, angle = curve.at(s)
-    straight = straightened(closeup.grey, where - closeup.origin_px, normals(angle), t)
-    strip = straight.reshape(count, block, len(t)).mean(axis=1)
+    s, t, strip, ok = _strip(closeup, curve, span, half_width / 4.0, half_width * (1.0 + 2.0 * SEARCH_RADII) + 4.0)
     rise = gaussian_filter1d(strip, max(1.0, 0.04 * half_width), axis=1, order=1)
-    ok = np.asarray(in_picture(closeup, curve, s, reach).reshape(count, block).all(axis=1))
     middle = _offset(medians(rise[ok], axis=0), t, half_width, tolerance)
     # The path wanders about the cable: look for the pair again along s, near the pair of the whole cable.
     sigma = SEARCH_RADII * half_width / 2.0 + 1.0
-    edges = np.empty((count, 2))
+    edges = np.empty((len(s), 2))
     for side, sign in ((0, -1.0), (1, 1.0)):
         near = np.exp(-0.5 * ((t - middle[side]) / sigma) ** 2)
         score = np.where(ok[:, None], np.maximum(sign * rise, 0.0), 0.0) * near
-        edges[:, side] = steepest(score, t, np.zeros(count), np.inf, -np.inf)
+        edges[:, side] = steepest(score, t, np.zeros(len(s)), np.inf, -np.inf)
         ok &= score.max(axis=1) > 0.0
-    return Found(s.reshape(count, block).mean(axis=1), edges, ok)
+    return Found(s, edges, ok)
+
+
+def where_alike(closeup: Closeup, curve: PlaneCurve, *, span: tuple[float, float], half_width: float) -> Array | None:
+    """Points (n, 2) px beside a path that see across the cable what the path sees along most of it; None if it is they.
+
+    A cable looks alike all along, and so does its shadow: a path that changes over to a shadow or a flank, which are as
+    wide, sees the cable again beside itself. What looks like nothing else (letters, a tie) is left where it is.
+    """
+    s, t, strip, ok = _strip(closeup, curve, span, half_width / 2.0, 2.0 * LOOK_RADII * half_width)
+    if not ok.any():
+        return None
+    count = int(np.count_nonzero(np.abs(t) <= LOOK_RADII * half_width))
+    own, aside = (len(t) - count) // 2, np.arange(len(t) - count + 1)
+    seen = np.lib.stride_tricks.sliding_window_view(strip, count, axis=1)
+    seen = seen - seen.mean(axis=2, keepdims=True)
+    seen /= np.maximum(np.linalg.norm(seen, axis=2, keepdims=True), 1e-12)
+    look = np.median(seen[ok, own], axis=0)
+    alike = seen @ (look / max(float(np.linalg.norm(look)), 1e-12))
+    moved = (aside - own)[np.argmax(alike, axis=1)]
+    told = ok & (np.max(alike, axis=1) > LOOK_SURE) & (np.abs(moved) > SEARCH_RADII * half_width)
+    moved = median_filter(np.where(told, moved, 0), size=LOOK_BLOCKS, mode="nearest")
+    where, angle = curve.at(s)
+    return where + moved[:, None] * normals(angle) if moved.any() else None
+
+
+def _strip(
+    closeup: Closeup, curve: PlaneCurve, span: tuple[float, float], block: float, reach: float
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Grey values (n, m) across a path, means over blocks at ``s`` (n,), at offsets (m,); blocks in the picture."""
+    size = max(2, round(block))
+    count = max(8, int((span[1] - span[0]) / size))
+    s = span[0] + (np.arange(count * size) + 0.5) * (span[1] - span[0]) / (count * size)
+    t = np.arange(-np.ceil(reach), np.ceil(reach) + 1.0)
+    where, angle = curve.at(s)
+    straight = straightened(closeup.grey, where - closeup.origin_px, normals(angle), t)
+    ok = np.asarray(in_picture(closeup, curve, s, t[-1]).reshape(count, size).all(axis=1))
+    return s.reshape(count, size).mean(axis=1), t, straight.reshape(count, size, len(t)).mean(axis=1), ok
 
 
 def _offset(rise: Array, t: Array, half_width: float, tolerance: float) -> tuple[float, float]:

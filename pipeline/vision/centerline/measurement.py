@@ -28,7 +28,14 @@ from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_erro
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
 from pipeline.vision.centerline.midline import Sections
 from pipeline.vision.centerline.path import fit_along, follow
-from pipeline.vision.centerline.refusal import beside_axis, feet_of_axes, middle_width, refusal, refusal_of_band
+from pipeline.vision.centerline.refusal import (
+    aside_of_both,
+    beside_axis,
+    feet_of_axes,
+    middle_width,
+    refusal,
+    refusal_of_band,
+)
 from pipeline.vision.median import median, scatter
 from pipeline.vision.polyline import arc_lengths
 from pipeline.vision.rough import RoughCable
@@ -85,6 +92,14 @@ class Followed:
             half *= min(1.0, scatter(self.fit.residual[used], 0.0) / scatter(half, 0.0))
         return HalfWidths(self.fit.s[used], half, self.fit.point_std[used], self.fit.smooth.correlation_length)
 
+    def on_midline(self) -> RoughCable:
+        """The cable as it was found, its path on the fitted curve where it is seen."""
+        first, last = self.rough.visible
+        path, points = self.rough.path_px.copy(), self.chord.to_frame(self.rough.path_px[first : last + 1])
+        s = self.fit.curve.foot(points, float(np.hypot(*(points[0] - self.chord.axes[0]))) + arc_lengths(points))
+        path[first : last + 1] = self.chord.to_pixels(self.fit.curve.at(s)[0])
+        return replace(self.rough, path_px=path)
+
     def loosened(self, left: float, right: float) -> Followed:
         """The cable with axes whose standard deviations (px) are so large at least."""
         one, other = self.rough.axes
@@ -127,7 +142,7 @@ def follow_cable(
 
 
 def _in_its_colours(
-    rough: RoughCable, plane: PlaneMap, diameter_m: float | None, axis_parallax_std: float
+    rough: RoughCable, plane: PlaneMap, diameter_m: float | None, axis_parallax_std: float, *, moved: bool = False
 ) -> Followed | Rejected:
     half_width = rough.half_width_px
     if diameter_m is not None:
@@ -148,6 +163,13 @@ def _in_its_colours(
         rough = _with_ends(rough, chord.to_pixels(fit.curve.at(feet)[0]))
         chord = chord_frame(rough, plane, axis_parallax_std)
         fit = _fit(sections, chord, width)
+    aside = None if moved else aside_of_both(rough, fit, chord, middle_width(width)[0])
+    if aside is not None:  # a flank, or a shadow as wide: the cable runs where its axes are
+        share = np.linspace(0.0, 1.0, len(rough.path_px))[:, None]
+        beside = replace(rough, path_px=rough.path_px + (1.0 - share) * aside[0] + share * aside[1])
+        cable = _in_its_colours(beside, plane, diameter_m, axis_parallax_std, moved=True)
+        if isinstance(cable, Followed):
+            return cable
     refused = refusal(rough, sections, fit, chord, width, diameter_m)
     if refused is not None:
         return refused

@@ -8,7 +8,7 @@ from pipeline.messages import Message
 from pipeline.records import Array, Rejected
 from pipeline.vision.centerline.curvature import Frame, PlaneCurve, make_frame, normals
 from pipeline.vision.centerline.curve_fit import CurveFit, fit_curve, follow_points, initial_curve
-from pipeline.vision.centerline.edges import SEARCH_RADII, Found, in_picture, search_edges
+from pipeline.vision.centerline.edges import SEARCH_RADII, Found, in_picture, search_edges, where_alike
 from pipeline.vision.centerline.midline import (
     EDGE_WINDOW_BLURS,
     LEAST_SECTIONS,
@@ -76,6 +76,9 @@ def follow(rough: RoughCable, *, half_width: float, known: bool, blur: float | N
     span = _span(path, (float(along[first]) + margin[0], float(along[last]) - margin[1]), covers, half_width)
     if span is None:
         return _lost(rough, 0.0)
+    alike = where_alike(closeup, path, span=span, half_width=half_width)
+    if alike is not None:
+        path = follow_points(alike, start=path, s=np.linspace(*span, len(alike)))
     tolerance = WIDTH_OFF * (1.0 if known else 2.0)  # a mask's width is known half as well
     for _ in range(3):  # a path half a width astray is back after two
         found = search_edges(closeup, path, span=span, half_width=half_width, tolerance=tolerance)

@@ -22,6 +22,7 @@ from pipeline.vision.scale.plane import ChordFrame
 from pipeline.vision.search.border import soft_beside_sharp
 
 _BESIDE_COVER = 0.5  # radii; flanks, shadows and stripes pass a cover's axis by 0.85 and more, a cable by a tenth
+_BESIDE_SHADOW = 3.0  # radii; of the middle of a shadow as wide that begins half a radius beside the cable
 _BESIDE_DOUBTED = 1.0  # radii; a cover that is not surely seen may lie elsewhere, but the cable runs over its axis
 _LEAST_BETWEEN_RIMS = 0.95  # diameters; a rim's dark line lies at the edge or beyond, nearer ones between highlights
 _BEND = 0.5  # curvature times diameter; on a radius of two diameters a cable kinks, a curve led astray bends
@@ -115,6 +116,18 @@ def feet_of_axes(fit: CurveFit, chord: ChordFrame) -> tuple[Array, Array]:
     """Arc lengths of the feet of both bearing axes on the curve, and their distances from it."""
     feet = fit.curve.foot(chord.axes, np.array([0.0, fit.curve.frame.knots[-1]]))
     return feet, np.asarray(np.hypot(*(fit.curve.at(feet)[0] - chord.axes).T))
+
+
+def aside_of_both(rough: RoughCable, fit: CurveFit, chord: ChordFrame, middle: float) -> Array | None:
+    """From the curve to its axes (2, 2) px, where both lie at one side of it, as far as a flank or a shadow runs."""
+    if any(axis.kind in ("end", "clamp") for axis in rough.axes):
+        return None
+    where, angle = fit.curve.at(feet_of_axes(fit, chord)[0])
+    x, y = (chord.axes - where).T
+    side = (np.cos(angle) * y - np.sin(angle) * x) / (0.5 * middle)
+    near, far = np.sort(np.sign(side[0]) * side)
+    beside = near > _BESIDE_COVER and far < _BESIDE_SHADOW
+    return chord.to_pixels(chord.axes) - chord.to_pixels(where) if beside else None
 
 
 def middle_width(width: Array) -> tuple[float, float]:
