@@ -25,11 +25,11 @@ from rod.inverse.fit import FITS, fit
 
 
 def pairs_beside(
-    bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int], *, rival: float
+    bench: Workbench, best: Explanation, second: Suspicion, causes: Sequence[int], *, hopeless: float
 ) -> list[Explanation]:
     """A single cause with each of some others, those in the model already left out.
 
-    ``rival`` is the chi-square that other causes have reached: fits that stay far above it end early.
+    ``hopeless``: chi-square above which a fit is of no use; what one pair has reached is a measure for the next.
     """
     found = []
     for cause in causes:
@@ -37,10 +37,10 @@ def pairs_beside(
             continue
         forms = kinds(second, cause)
         loud = [form for form in forms if second.statistic[form] >= NEARLY_AS_LOUD * second.statistic[forms[0]]]
-        fits = (fit_term(bench.observation, best.fitted, second, form, hopeless=rival + LEAST) for form in loud)
+        fits = (fit_term(bench.observation, best.fitted, second, form, hopeless=hopeless) for form in loud)
         fitted = min((one for one in fits if one is not None), key=cost, default=None)
         if fitted is not None:
-            rival = min(rival, fitted.chi2)
+            hopeless = min(hopeless, fitted.chi2 + LEAST)
             found.append(explanation_of((best.causes[0], cause), bench.base, fitted))
     return found
 

@@ -3,7 +3,9 @@
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
 -> what has no name, beside the likeliest four -> what is likely beside these -> causes exchanged while a
 pair that shares one with the likeliest is likelier -> pairs pruned of what they do not need -> where something else is
-likelier still, the nearest cause with all others -> probabilities of all.
+likelier still, the nearest cause with all others that show beside it -> probabilities of all.
+
+A pair is fitted as far as chi-square may fall to where it were worth a hundredth of what is likeliest.
 
 Two causes may hide each other, each below its threshold: where no single one is likely, or something else is likelier,
 the pair that removes most by the linear scores is fitted from both at once (`together`).
@@ -74,15 +76,16 @@ class Search:
         return posterior(self.hypotheses, self.causes)
 
     def add(self, found: Sequence[Explanation]) -> list[Explanation]:
-        """Weigh refits and return them; the likeliest are fitted to the end and weighed with something else too."""
-        rest = self.hypotheses[0].rest
+        """Weigh refits and return them; what is among the likeliest is fitted to the end, and with something else."""
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
-        hopeless = far_behind(self._least([one for _, one in new]))
-        best = [self._settled(one, hopeless) for _, one in new[:LIKELIEST]]
-        self.hypotheses += [refitted(self.grid, one, self.bench.facts) for one in best]
-        self.hypotheses += [Hypothesis(one.causes, plain, rest, one) for plain, one in new[LIKELIEST:]]
-        return [*best, *(one for _, one in new[LIKELIEST:])]
+        known = [one.plain for one in self.hypotheses if one.found is not None]
+        least = min(sorted([*known, *(plain for plain, _ in new)])[-LIKELIEST:], default=0.0)
+        rest, hopeless = self.hypotheses[0].rest, far_behind(self._least(found))
+        best = [self._settled(one, hopeless) for plain, one in new if plain >= least]
+        others = [Hypothesis(one.causes, plain, rest, one) for plain, one in new if plain < least]
+        self.hypotheses += [*(refitted(self.grid, one, self.bench.facts) for one in best), *others]
+        return [*best, *(one for plain, one in new if plain < least)]
 
     def _least(self, new: Sequence[Explanation] = ()) -> float:
         """Smallest chi-square of all refits of named causes; infinite without any."""
@@ -94,14 +97,14 @@ class Search:
         return one if fitted is one.fitted else explanation_of(one.causes, self.bench.base, fitted)
 
     def singles(self) -> list[Explanation]:
-        """Refit causes that matter or score near the best one; all the others where something else is likelier."""
+        """Refit causes that matter or score near the best one; all that show where something else is likelier."""
         linear = {one.causes[0] for one in self.posterior.believed if len(one.causes) == 1 and one.probability > ALSO}
         near = candidates(self.bench.suspicion, any_sign="mounted" not in self.bench.facts.branch)
         tried = [*near, *sorted(linear - set(near))]
         found = self.add(list(self._each(tried)))
         if self.posterior.word == "rest":
-            every = range(len(self.bench.suspicion.causes))
-            found += self.add(list(self._each([cause for cause in every if cause not in tried])))
+            others = set(range(len(self.bench.suspicion.causes))) - set(tried)
+            found += self.add(list(self._each([k for k in sorted(others) if self._shows(self.bench.suspicion, k)])))
         return found
 
     def _each(self, causes: Sequence[int]) -> Iterator[Explanation]:
@@ -138,7 +141,7 @@ class Search:
         self.hypotheses = [one for one in self.hypotheses if len(one.causes) < 2 or one.found]
         found = self.add(found)
         for member in self._members_alone(begun):
-            self.add([member])
+            (member,) = self.add([member])
             found += self.add(self._with_others(member))
         self.add(list(self._pruned(found)))
         believed = self.posterior
@@ -160,9 +163,8 @@ class Search:
 
     def _with_others(self, one: Explanation) -> list[Explanation]:
         """A single cause with each of the two that score most beside it, and of those that are likely by the scores."""
-        promised = self._promised(one)
-        rivals = [known.plain for known in self.hypotheses if known.found is not None]
-        enough = np.logaddexp.reduce([*promised.values(), *rivals]) + np.log(ALSO)
+        promised, known = self._promised(one), [known.plain for known in self.hypotheses if known.found is not None]
+        enough = np.logaddexp.reduce([*promised.values(), *known, self._top]) + np.log(ALSO)
         likely = [cause for cause, plain in promised.items() if plain > enough]
         return self._pairs_beside(one, [*dict.fromkeys([*candidates(self.beside(one))[:2], *likely])])
 
@@ -171,11 +173,29 @@ class Search:
         if one not in self._beside:
             self._beside[one] = weighed(self.grid.plain, one.fitted, self.beside(one))
         beside = self._beside[one]
-        mine = next((known.plain for known in self.hypotheses if known.found is one), beside.own.plain)
-        return {cause: plain + mine - beside.own.plain for cause, (plain, _) in beside.further.items()}
+        mine = self._plain(one) - beside.own.plain
+        return {cause: plain + mine for cause, (plain, _) in beside.further.items()}
+
+    def _plain(self, one: Explanation) -> float:
+        return next(known.plain for known in self.hypotheses if known.found is one)
+
+    @property
+    def _top(self) -> float:
+        """Log evidence of what is most probable."""
+        return self.hypotheses[0].plain + self.posterior.believed[0].gain
 
     def _pairs_beside(self, one: Explanation, causes: Sequence[int]) -> list[Explanation]:
-        return pairs_beside(self.bench, one, self.beside(one), causes, rival=self._least())
+        """A single cause with those of some others that show beside it, as far as that may come near the likeliest."""
+        # log evidence rises by at most half of what chi-square falls by
+        hopeless = one.fitted.chi2 - 2.0 * (self._top + np.log(ALSO) - self._plain(one))
+        second, hopeless = self.beside(one), min(hopeless, self._least() + LEAST)
+        seen = [cause for cause in causes if self._shows(second, cause)]
+        return pairs_beside(self.bench, one, second, seen, hopeless=hopeless)
+
+    def _shows(self, about: Suspicion, cause: int) -> bool:
+        """Whether a cause scores as each member of a pair must; without a photo of the cable at rest, with any sign."""
+        score = about.statistic if "mounted" in self.bench.facts.branch else np.abs(about.scores.z)
+        return bool(score[about.of(cause)].max(initial=0.0) > NEEDED)
 
     def _members_alone(self, begun: set[Forms]) -> Iterator[Explanation]:
         """Causes of the likeliest pair, each fitted alone in the form that it has there, if that is new."""
@@ -282,9 +302,9 @@ class Search:
 
     def pairs_speak(self, best: Explanation) -> bool:
         """Whether the data make, or may make, two causes or something else likelier than they were beforehand."""
-        second, rest = self.beside(best), self.hypotheses[0].rest
+        rest = self.hypotheses[0].rest
         for cause, plain in self._promised(best).items():
-            if cause not in best.causes and second.statistic[second.of(cause)].max() > NEEDED:
+            if cause not in best.causes and self._shows(self.beside(best), cause):
                 self.hypotheses.append(Hypothesis((*best.causes, cause), plain, rest))
         believed = self.posterior
         beforehand = sum(SHARES[2]) + sum(something_else for _, something_else in SHARES.values())
