@@ -65,9 +65,9 @@ def test_all_causes_that_are_likely_beside_one_are_tried(monkeypatch):
     bench = prepare(faults_of_input(test), SETTINGS)
     names = [cause.name for cause in bench.suspicion.causes]
     tried = []
-    monkeypatch.setattr(search, "pairs_beside", lambda bench, one, second, causes, rival: tried.extend(causes) or [])
+    monkeypatch.setattr(search, "pairs_beside", lambda bench, one, second, causes, hopeless: tried.extend(causes) or [])
     seeking, varying = search.Search(bench), names.index("pre_curvature_varying")
-    seeking._with_others(refit_one(bench.observation, bench.base, bench.suspicion, varying))
+    seeking._with_others(*seeking.add([refit_one(bench.observation, bench.base, bench.suspicion, varying)]))
     assert {"force_offset", "displacement_offset", "in_plane_load"} <= {names[cause] for cause in tried}
     assert len(tried) < 7
 
