@@ -58,6 +58,10 @@ SIZES = np.geomspace(0.003, 10.0, 8)
 INVISIBLE = 1e-9
 """Of a column's square: what falls below is rounding."""
 
+FEW = 12.0
+"""Of log p: a prior of the law that is so much less likely than all together counts for nothing beside a further column
+either."""
+
 
 class Evidence(NamedTuple):
     """Log probability of the data, by the model alone (``plain``) and with something else besides (``rest``).
@@ -293,7 +297,7 @@ def _with_each(fitted: Fit, terms: Sequence[Term], solved: Solved, by_law: Array
     law, half = _onto_law(solved)
     pulled = solved.products.cross[:, :several] - solved.pull.swapaxes(1, 2) @ half
     mean, beside = mean_over_laws(by_law), solved.products.rest
-    least = mean + np.log(by_law[0, ..., 0].size) - NOTHING
+    least = mean + np.log(by_law[0, ..., 0].size) - FEW
     # something else that is nothing for a residual is left out for it, though others in its company asked for it
     least[beside] = np.maximum(least[beside], np.max(mean[beside], axis=0, initial=-np.inf) - NOTHING)
     total = np.full((2, several, law.shape[2]), -np.inf)
