@@ -4,7 +4,7 @@ Strategy. A smooth path within a few pixels of the midline gives each pixel near
 the path, and across it, positive to the right of the direction of travel as seen on the photo. Pixels are used as they
 are, at their true ``(s, t)``: nothing is interpolated, so errors stay independent and edges keep their blur.
 
-0. `where_alike`: where the path has left the cable for its shadow, what is seen across it is elsewhere beside it.
+0. `where_alike`: where the path has left the cable for its shadow, the look of the cable is found beside it.
 1. `search_edges`: on block means of the straightened strip, the pair of gradients that a cable of about the known width
    would show. Searched from the expected edges, so highlights and text on the sheath do not compete.
 2. `fit_profiles`: per side, in windows along s with hundreds of pixels each: the whole edge profile
@@ -38,7 +38,7 @@ SEARCH_RADII = 0.35
 false edge (highlight, text) is mostly farther.
 """
 
-LOOK_RADII, LOOK_BLOCKS, LOOK_SURE = 1.6, 9, 0.5**0.5
+_LOOK_RADII, _LOOK_BLOCKS, _LOOK_SURE = 1.6, 9, 0.5**0.5
 """Radii on both sides of a path: the cable with the ground beside it, and as far aside; blocks of half a radius, of
 which most must be seen aside: letters and stripes are shorter than two widths; correlation from which on the look of
 the cable explains more than half of what is seen.
@@ -105,15 +105,15 @@ def search_edges(
 
 
 def where_alike(closeup: Closeup, curve: PlaneCurve, *, span: tuple[float, float], half_width: float) -> Array | None:
-    """Points (n, 2) px beside a path that see across the cable what the path sees along most of it; None if it is they.
+    """Points (n, 2) px where the picture looks across as it does along most of a path; None where it is nowhere astray.
 
     A cable looks alike all along, and so does its shadow: a path that changes over to a shadow or a flank, which are as
     wide, sees the cable again beside itself. What looks like nothing else (letters, a tie) is left where it is.
     """
-    s, t, strip, ok = _strip(closeup, curve, span, half_width / 2.0, 2.0 * LOOK_RADII * half_width)
+    s, t, strip, ok = _strip(closeup, curve, span, half_width / 2.0, 2.0 * _LOOK_RADII * half_width)
     if not ok.any():
         return None
-    count = int(np.count_nonzero(np.abs(t) <= LOOK_RADII * half_width))
+    count = int(np.count_nonzero(np.abs(t) <= _LOOK_RADII * half_width))
     own, aside = (len(t) - count) // 2, np.arange(len(t) - count + 1)
     seen = np.lib.stride_tricks.sliding_window_view(strip, count, axis=1)
     seen = seen - seen.mean(axis=2, keepdims=True)
@@ -121,8 +121,8 @@ def where_alike(closeup: Closeup, curve: PlaneCurve, *, span: tuple[float, float
     look = np.median(seen[ok, own], axis=0)
     alike = seen @ (look / max(float(np.linalg.norm(look)), 1e-12))
     moved = (aside - own)[np.argmax(alike, axis=1)]
-    told = ok & (np.max(alike, axis=1) > LOOK_SURE) & (np.abs(moved) > SEARCH_RADII * half_width)
-    moved = median_filter(np.where(told, moved, 0), size=LOOK_BLOCKS, mode="nearest")
+    told = ok & (np.max(alike, axis=1) > _LOOK_SURE) & (np.abs(moved) > SEARCH_RADII * half_width)
+    moved = median_filter(np.where(told, moved, 0), size=_LOOK_BLOCKS, mode="nearest")
     where, angle = curve.at(s)
     return where + moved[:, None] * normals(angle) if moved.any() else None
 
