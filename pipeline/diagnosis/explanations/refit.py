@@ -15,7 +15,7 @@ from pipeline.diagnosis.fits.search import TRACE, Suspicion
 from pipeline.diagnosis.posterior.products import WORSE
 from pipeline.records import Array
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import FAR, Fit, State, fit, shown
+from rod.inverse.fit import FAR, PROMISED, Fit, State, fit, shown
 from rod.inverse.observation import Observation
 
 SHARES = (1.0, 0.3, 0.1)
@@ -98,7 +98,7 @@ def fit_term(
     Returns
     -------
     Fit or None
-        None where the model has no equilibrium from any start.
+        None where the model has no equilibrium from any start, or where its score promises nothing of use.
     """
     term = suspicion.terms[direction]
     if not tuned:
@@ -106,9 +106,10 @@ def fit_term(
     added = Addition(base, term, float(suspicion.scores.estimate[direction]), suspicion.columns[:, direction])
     best: Fit | None = None
     far = FAR * (len(base.residual) - added.extension.size)
-    for start, spare in ((linear_start(observation, added), False), *_elsewhere(added)):
-        if spare and hopeless < far:
-            continue
+    elsewhere = [start for start, spare in _elsewhere(added) if not spare or hopeless >= far]
+    if not elsewhere and base.chi2 - PROMISED * suspicion.scores.z[direction] ** 2 > hopeless:
+        return None
+    for start in (linear_start(observation, added), *elsewhere):
         found = fit(observation, added.extension, start, near=base.run, hopeless=hopeless)
         if found.run.prediction is not None and (best is None or found.chi2 < best.chi2):
             best, hopeless = found, min(hopeless, found.chi2)  # from elsewhere only what leads lower is of use

@@ -41,7 +41,7 @@ from pipeline.diagnosis.fits.search import Suspicion, beside_usual, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
-from pipeline.diagnosis.posterior.hypotheses import ALIKE, SHARES, Hypothesis, Posterior, posterior
+from pipeline.diagnosis.posterior.hypotheses import ALIKE, LEVEL, SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import Weighed, refitted, weighed
 from rod.inverse.base_fit import settled
 from rod.inverse.extension import Term
@@ -254,8 +254,15 @@ class Search:
             usable = (found for found in fits if found is not None and found.run.prediction is not None)
             whole = (found if found.converged else settled(bench.observation, found) for found in usable)
             self._weigh_unnamed(one.causes, whole)
-        for unknown in UNKNOWN:
+        for unknown in () if self._settled_by_one else UNKNOWN:
             self._weigh_unknown(unknown, hopeless)
+
+    @property
+    def _settled_by_one(self) -> bool:
+        """Whether one cause is surely there and leaves nothing to be explained besides."""
+        first = self.posterior.believed[0]
+        found = None if first.something_else or first.probability < LEVEL else first.found
+        return found is not None and found.fitted.leaves_noise
 
     def _weigh_unknown(self, unknown: Unknown, hopeless: float) -> None:
         """Forces or moments at each place, then of the size that they say themselves, with more beside, and begins.

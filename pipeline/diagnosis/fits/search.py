@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,15 +124,16 @@ def beside_usual(fitted: Fit, suspicion: Suspicion) -> Suspicion:
 def direction(observation: Observation, fitted: Fit, term: Term, *, amount: float) -> Array:
     """Whitened column (N,) of one form of a cause, from zero to ``amount``.
 
-    Where that amount leaves no equilibrium, smaller ones are tried, then the other sign: a base model that stands for a
-    large cause lies at its limits. A column of zeros says that not even a trace can be simulated.
+    Where that amount leaves no equilibrium near the fitted one, smaller ones are tried, then the other sign: a base
+    model that stands for a large cause lies at its limits. Where none does, all are sought along paths. A column of
+    zeros says that not even a trace can be simulated.
     """
     facts = fitted.extension.facts
     smaller = [amount * share for share in SMALLER]
     trials = smaller if term.cause.sign else [*smaller, *(-step for step in smaller[1:])]
-    for step in trials:
+    for patient, step in product((False, True), trials):
         model = term.cause.apply(fitted.run.model, step, term.variant, facts)
-        shown = run(model, facts, near=fitted.run).prediction
+        shown = run(model, facts, near=fitted.run, patient=patient).prediction
         there = whole_residual(observation, shown, fitted.vector, fitted.extension.prior)
         if there is not None:
             return (fitted.residual - there) / step
