@@ -77,16 +77,23 @@ class Search:
         return posterior(self.hypotheses, self.causes)
 
     def add(self, found: Sequence[Explanation]) -> list[Explanation]:
-        """Weigh refits and return them; what is among the likeliest is fitted to the end, and with something else."""
+        """Weigh refits, likeliest first; what is among the likeliest is fitted to the end, and with something else."""
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
         known = [one.plain for one in self.hypotheses if one.found is not None]
         least = min(sorted([*known, *(plain for plain, _ in new)])[-LIKELIEST:], default=0.0)
         rest, hopeless = self.hypotheses[0].rest, far_behind(self._least(found))
-        best = [self._settled(one, hopeless) for plain, one in new if plain >= least]
-        others = [Hypothesis(one.causes, plain, rest, one) for plain, one in new if plain < least]
-        self.hypotheses += [*(refitted(self.grid, one, self.bench.facts) for one in best), *others]
-        return [*best, *(one for plain, one in new if plain < least)]
+        done = list[Explanation]()
+        for plain, one in new:
+            if plain >= least:
+                done.append(self._settled(one, hopeless))
+                self.hypotheses.append(refitted(self.grid, done[-1], self.bench.facts))
+                # beside what is surely there and leaves noise nothing far less likely is worth more by something else
+                least = max(least, self._top + np.log(ALSO)) if self._settled_by_one else least
+            else:
+                done.append(one)
+                self.hypotheses.append(Hypothesis(one.causes, plain, rest, one))
+        return done
 
     def _least(self, new: Sequence[Explanation] = ()) -> float:
         """Smallest chi-square of all refits of named causes; infinite without any."""
@@ -243,7 +250,8 @@ class Search:
     def unnamed(self) -> None:
         """What has no name in the catalogue: moments beside the base model, what begins beside the likeliest causes."""
         base, bench = explanation_of((), self.bench.base, self.bench.base), self.bench
-        known = [base, *(found.found for found in self.posterior.explanations()[:LIKELIEST] if found.found)]
+        likeliest = self.posterior.explanations()[: 1 if self._settled_by_one else LIKELIEST]
+        known = [base, *(found.found for found in likeliest if found.found)]
         hopeless = min(one.fitted.chi2 for one in known) + LEAST
         for one in known:
             about = suspect(bench.observation, one.fitted, (*BEGUN, LEVER))
