@@ -1,0 +1,62 @@
+"""What is not fitted, since it could change nothing: and that it changes nothing."""
+
+import numpy as np
+import pytest
+
+from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
+from fixtures.hidden import hidden_test
+from pipeline.diagnosis.causes import CATALOGUE
+from pipeline.diagnosis.causes.unnamed import UNKNOWN
+from pipeline.diagnosis.explanations.refit import fit_term
+from pipeline.diagnosis.explanations.search import Search, searched
+from pipeline.diagnosis.fits.workbench import prepare
+from pipeline.faults import faults_of_input
+from pipeline.settings.diagnosis import DiagnosisSettings
+from rod.inverse.fit import PROMISED, fit
+
+CAUSES = "camera_tilt scale_error rig_compliance relaxation"
+
+
+@pytest.fixture(scope="module")
+def bench():
+    """A camera that is tilted, among four causes."""
+    cable, reading = HIDE["camera_tilt"](0.06, Form())
+    test = hidden_test(cable, PROTOCOLS["six"], largest=LARGEST, seed=31, reading=reading)
+    causes = [cause for cause in CATALOGUE if cause.name in CAUSES.split()]
+    return prepare(faults_of_input(test), DiagnosisSettings(), causes=causes)
+
+
+def test_a_fit_goes_on_only_where_the_linear_model_promises_a_quarter_of_what_is_asked(bench):
+    base = bench.base
+    start = base.vector.copy()
+    start[0] += 0.01  # f_EI one per cent higher in one place
+    begun = fit(bench.observation, base.extension, start, near=base.run, iterations=0)
+    promised = begun.chi2 - base.chi2
+    assert 0.0 < promised < 0.1 * base.chi2
+    hopeful = fit(bench.observation, base.extension, start, near=base.run, hopeless=begun.chi2 - 0.9 * promised)
+    assert hopeful.chi2 == pytest.approx(base.chi2, rel=1e-4)
+    asked = begun.chi2 - 1.2 * PROMISED * promised
+    hopeless = fit(bench.observation, base.extension, start, near=base.run, hopeless=asked)
+    assert hopeless.converged and np.array_equal(hopeless.vector, start)
+
+
+def test_a_form_is_fitted_only_where_its_score_promises_a_quarter_of_what_is_asked(bench):
+    gain = bench.suspicion.scores.z**2
+    least = int(np.argmin(np.where(gain > 0.0, gain, np.inf)))
+    asked = bench.base.chi2 - 1.1 * PROMISED * gain[least]
+    assert fit_term(bench.observation, bench.base, bench.suspicion, least, hopeless=asked) is None
+    assert fit_term(bench.observation, bench.base, bench.suspicion, least) is not None
+
+
+def test_forces_without_a_name_would_change_nothing_beside_a_cause_that_is_surely_there(bench, monkeypatch):
+    short = searched(bench).posterior
+    assert not any(
+        term.cause in UNKNOWN for one in short.believed if one.found for term in one.found.fitted.extension.terms
+    )
+    monkeypatch.setattr(Search, "_settled_by_one", False)
+    long = searched(bench).posterior
+    assert any(term.cause in UNKNOWN for one in long.believed if one.found for term in one.found.fitted.extension.terms)
+    assert short.word == long.word == "causes"
+    assert short.believed[0].causes == long.believed[0].causes
+    # a twentieth of what a probability is good for, 0.03
+    assert short.believed[0].probability == pytest.approx(long.believed[0].probability, abs=0.0015)
