@@ -14,9 +14,10 @@ from pipeline.settings.vision import VisionSettings
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo, decode_photo
-from pipeline.vision.render import Camera, Curve, Ground, Scene, Sensor, Strand, render
+from pipeline.vision.render import Camera, Ground, Scene, Sensor, Strand, render
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
+from tests.pipeline.vision.curves import of_curvature
 
 SETTINGS = VisionSettings()
 LENGTH, DIAMETER, COVER = 0.181, 0.0046, 0.012
@@ -24,7 +25,7 @@ LENGTH, DIAMETER, COVER = 0.181, 0.0046, 0.012
 
 def photo_file(px_per_mm, size, enlarged):
     """A rendered photo, or one enlarged twice to colour with new noise, which is quicker than rendering that."""
-    curve = Curve.from_curvature(lambda s: 4.0 + 3.0 * np.sin(np.pi * s / LENGTH), LENGTH)
+    curve = of_curvature(lambda s: 4.0 + 3.0 * np.sin(np.pi * s / LENGTH), LENGTH)
     camera = Camera(*size, px_per_mm * 1e3, look_at_m=(0.5 * curve.chord, 0.02))
     ground = Ground("brushed", (0.75,) * 3, 0.03)
     pixels = render(Scene(Strand(curve, DIAMETER), camera, ground=ground, sensor=Sensor(noise=0.01))).pixels

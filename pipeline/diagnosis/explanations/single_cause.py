@@ -19,7 +19,7 @@ from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
 from pipeline.diagnosis.statistics.score import descending
 from rod.inverse.base_fit import settled
 from rod.inverse.cause import Profile
-from rod.inverse.fit import FITS, Fit, fit
+from rod.inverse.fit import FITS, Fit
 from rod.inverse.observation import Observation
 
 ALSO = 0.01
@@ -109,8 +109,6 @@ def _fit_form(
     found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
     if found is None or found.converged:
         return found
-    if found.chi2 > hopeless:  # it goes on as far as it may still come near
-        found = fit(observation, found.extension, found.vector, near=found.run, hopeless=hopeless)
     tried = [found if found.chi2 > hopeless else settled(observation, found)]
     if suspicion.terms[direction].variant.tuned:
         held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)

@@ -17,7 +17,6 @@ pixel, because the skewness f (1 - f) (1 - 2 f) of a partly covered pixel surviv
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import partial
 from math import ceil, sqrt
@@ -50,32 +49,6 @@ class Curve:
     y: Array
     theta: Array
     kappa: Array
-
-    @classmethod
-    def from_curvature(cls, kappa: Callable[[Array], ArrayLike] | float, length: float, *, n: int = 2001) -> Curve:
-        """Curve of a curvature kappa(s), its ends on the x axis, positive curvature bending toward y.
-
-        The tangent angle falls along s where the bow is positive: x' = cos theta, y' = sin theta, theta' = -kappa.
-        ``theta`` of the record is that tangent angle.
-
-        Parameters
-        ----------
-        kappa : callable or float, 1/m
-        length : m
-        n : int
-            Nodes; the angle is integrated by the spline through them, the position by Gauss points on it.
-        """
-        s = np.linspace(0.0, length, n)
-        values = np.broadcast_to(np.asarray(kappa(s) if callable(kappa) else kappa, dtype=float), s.shape)
-        angle = CubicSpline(s, values).antiderivative()
-        nodes, weights = np.polynomial.legendre.leggauss(4)
-        h = s[1] - s[0]
-        inner = angle(s[:-1, None] + 0.5 * h * (nodes + 1.0))
-        x = np.concatenate([[0.0], np.cumsum(0.5 * h * np.cos(inner) @ weights)])
-        y = np.concatenate([[0.0], np.cumsum(-0.5 * h * np.sin(inner) @ weights)])
-        lift = -np.arctan2(y[-1], x[-1])
-        c, q = np.cos(lift), np.sin(lift)
-        return cls(s, c * x - q * y, q * x + c * y, lift - angle(s), values.copy())
 
     @property
     def chord(self) -> float:

@@ -15,13 +15,13 @@ from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand, render
 from pipeline.vision.render.sheath import Sheath
-from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.search.ends import CableEnd
 from pipeline.vision.segmentation import find_cable
+from tests.pipeline.vision.curves import of_curvature
 
 SCALE = 9_000.0
-CURVE = Curve.from_curvature(9.0, 0.035)
+CURVE = of_curvature(9.0, 0.035)
 CAMERA = Camera(540, 300, SCALE, look_at_m=(0.017, 0.0))
 
 

@@ -14,7 +14,6 @@ from pipeline.settings.vision import CalibrationSettings, VisionSettings
 from pipeline.vision.bearings.steady import moved_axes
 from pipeline.vision.photo import Photo
 from pipeline.vision.render import Camera, ChessBoard, Ground, Scene, Sensor, Strand, render_board
-from pipeline.vision.render.strand import Curve
 from pipeline.vision.rough import Bearing, RoughCable
 from pipeline.vision.scale.board import MAX_BORDER_STD, calibrate_by_board, find_board
 from pipeline.vision.scale.calibration import (
@@ -28,10 +27,11 @@ from pipeline.vision.scale.calibration import (
 from pipeline.vision.scale.corners import refine_corners
 from pipeline.vision.scale.plane import Lens, PlaneMap
 from pipeline.vision.scale.plane_fit import BoardView, fit_views
+from tests.pipeline.vision.curves import of_curvature
 
 STAGE = CalibrationSettings()
 SETTINGS = VisionSettings()
-CURVE = Curve.from_curvature(5.0, 0.18)
+CURVE = of_curvature(5.0, 0.18)
 SQUARE = 0.010
 BOARD = Board(13, 7, SQUARE)
 

@@ -11,9 +11,10 @@ from pipeline.records import Rejected
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
-from pipeline.vision.render import Camera, Curve, Scene, Sensor, Strand, render
+from pipeline.vision.render import Camera, Scene, Sensor, Strand, render
 from pipeline.vision.search.closeup import edge_spreads, take_closeup
 from pipeline.vision.segmentation import find_cable
+from tests.pipeline.vision.curves import of_curvature
 
 WIDTH, BEND = 36.0, 700.0  # px: of the cable, and radius of its axis
 
@@ -87,7 +88,7 @@ def test_letters_on_the_sheath_are_no_blur():
 @pytest.mark.parametrize("sensor", [Sensor(motion_px=25.0, motion_rad=0.6), Sensor(blur_px=8.0)], ids=["moved", "blur"])
 def test_covers_lost_in_blur_are_no_reason_of_their_own(sensor):
     length, scale = 0.181, 8_000.0
-    curve = Curve.from_curvature(lambda s: 3.0 + 5.0 * np.sin(np.pi * s / length), length)
+    curve = of_curvature(lambda s: 3.0 + 5.0 * np.sin(np.pi * s / length), length)
     camera = Camera(1640, 640, scale, look_at_m=(0.5 * curve.chord, 0.5 * curve.y.max()))
     pixels = render(Scene(Strand(curve, 0.0046), camera, sensor=sensor)).pixels
     known = Cable(0.0046 * scale, length * scale, BearingHints(cover_px=0.012 * scale))

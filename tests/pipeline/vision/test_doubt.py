@@ -6,13 +6,13 @@ import numpy as np
 
 from pipeline.settings.vision import CalibrationSettings
 from pipeline.vision.render import Camera, ChessBoard
-from pipeline.vision.render.strand import Curve
 from pipeline.vision.scale.calibration import Calibration, from_number, with_doubt_of_plane
 from pipeline.vision.scale.plane_fit import USUAL_LENS, fit_views
+from tests.pipeline.vision.curves import of_curvature
 from tests.pipeline.vision.test_calibration import SQUARE, views_of
 
 STAGE = CalibrationSettings()
-CURVE = Curve.from_curvature(8.0, 0.18)
+CURVE = of_curvature(8.0, 0.18)
 
 
 @dataclass(frozen=True)

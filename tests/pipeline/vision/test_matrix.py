@@ -27,10 +27,11 @@ from pipeline.vision.render.lighting import DIRECTIONAL, EVEN, Light
 from pipeline.vision.render.sensor import write_picture
 from pipeline.vision.render.sheath import WHITE, Sheath
 from pipeline.vision.series import trace_series
+from tests.pipeline.vision.curves import of_curvature
 from tests.pipeline.vision.drawn import drawn
 
 LENGTH, DIAMETER = 0.181, 0.0046
-BENT = Curve.from_curvature(lambda s: 2.0 + 7.0 * np.sin(np.pi * s / LENGTH), LENGTH)
+BENT = of_curvature(lambda s: 2.0 + 7.0 * np.sin(np.pi * s / LENGTH), LENGTH)
 FIXED = (LENGTH - BENT.chord, 0.0)
 METAL = Ground("brushed", (0.76, 0.76, 0.77), 0.02)
 GREY = Cover()
@@ -127,7 +128,7 @@ def series(
 ) -> Traces:
     """Photos of a cable bent more and more, each taken at a scale of its own while the first one's is stated."""
     steps, images = [], {}
-    bows = [Curve.from_curvature(kappa, LENGTH) for kappa in curvatures]
+    bows = [of_curvature(kappa, LENGTH) for kappa in curvatures]
     for number, (bow, scale) in enumerate(zip(bows, scales, strict=True)):
         cable = Strand(bow, DIAMETER, Sheath(gloss=0.3), (LENGTH - bow.chord, 0.0), overhang_m=0.003)
         camera = Camera(1864, 760, scale, (0.5 * LENGTH, 0.02))
@@ -203,10 +204,8 @@ TRACED: dict[str, Case] = {
     "clutter": Case(scene={"things": CLUTTER}),
     "5 px/mm": Case(px_per_m=5_000.0),
     "blur 3 px": Case(scene={"sensor": Sensor(blur_px=3.0)}),
-    "slightly bent": Case(curve=Curve.from_curvature(1.5, LENGTH)),
-    "one-sided": Case(
-        curve=Curve.from_curvature(lambda s: 2 + 12 * np.exp(-(((s / LENGTH - 0.3) / 0.15) ** 2)), LENGTH)
-    ),
+    "slightly bent": Case(curve=of_curvature(1.5, LENGTH)),
+    "one-sided": Case(curve=of_curvature(lambda s: 2 + 12 * np.exp(-(((s / LENGTH - 0.3) / 0.15) ** 2)), LENGTH)),
 }
 
 
@@ -257,8 +256,8 @@ def test_way_of_storing_does_not_matter(name: str, tmp_path: Path) -> None:
 
 
 # A path that meets itself: one whole turn within 50 mm.
-SELF_CROSSING = Curve.from_curvature(lambda s: 1 + 2 * np.pi / 0.04 * np.exp(-np.pi * ((s - 0.09) / 0.04) ** 2), LENGTH)
-ACROSS = Strand(Curve.from_curvature(1.0, 0.12), DIAMETER, Sheath(gloss=0.3), (0.04, -0.03), 1.2)
+SELF_CROSSING = of_curvature(lambda s: 1 + 2 * np.pi / 0.04 * np.exp(-np.pi * ((s - 0.09) / 0.04) ** 2), LENGTH)
+ACROSS = Strand(of_curvature(1.0, 0.12), DIAMETER, Sheath(gloss=0.3), (0.04, -0.03), 1.2)
 BESIDE = Strand(BENT, DIAMETER, Sheath(gloss=0.3), (FIXED[0], 0.0065))
 PALE = Sheath(colour=(0.8, 0.8, 0.8))
 
@@ -323,7 +322,7 @@ def test_photo_of_any_usual_rig_is_right_or_refused(seed: int, tmp_path: Path) -
     photography = usual_photography(seed)
     rng = np.random.default_rng([seed, 5])
     k0, bow, skew = rng.uniform(0.5, 2.5), rng.uniform(3.0, 9.0), rng.uniform(-1.0, 1.0)
-    curve = Curve.from_curvature(lambda s: k0 + bow * np.sin(np.pi * s / LENGTH) + skew * (2 * s / LENGTH - 1), LENGTH)
+    curve = of_curvature(lambda s: k0 + bow * np.sin(np.pi * s / LENGTH) + skew * (2 * s / LENGTH - 1), LENGTH)
     state = State(0.0, curve.chord, curve.s, curve.x, curve.y, curve.theta, curve.kappa, 0.0 * curve.s)
     experiment = Experiment(length_m=LENGTH, diameter_m=DIAMETER)
     scene = photography.scene(experiment, state, photography.camera(experiment, (state,)), seed)

@@ -12,7 +12,7 @@ import pytest
 from fixtures.grounds import cloth, squared, stone, wood
 from fixtures.things import Thing
 from fixtures.turned import turned_jpeg
-from pipeline.vision.render import Cover, Curve, Ground, Scene, Sensor, Strand, render, render_board
+from pipeline.vision.render import Cover, Ground, Scene, Sensor, Strand, render, render_board
 from pipeline.vision.render.clutter import ChessBoard
 from pipeline.vision.render.ground import Texture
 from pipeline.vision.render.lens import Camera
@@ -20,6 +20,7 @@ from pipeline.vision.render.lighting import DIRECTIONAL, Light, cylinder
 from pipeline.vision.render.sensor import encode
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.render.strand import half_plane
+from tests.pipeline.vision.curves import of_curvature
 
 # A black cable on a white sheet, without noise: what is dark is coverage and nothing else.
 LEVEL = 60_000  # a white that 16 bits hold exactly: half a count over 300 px moves a first moment by 4e-3 px
@@ -39,7 +40,7 @@ def darkness(cable: Strand, camera: Camera, blur_px: float) -> np.ndarray:
 @pytest.mark.parametrize("blur", [0.6, 0.8, 2.0])
 def test_straight_bar_has_the_midline_and_width_of_its_formula(roll: float, shift: float, blur: float) -> None:
     camera = Camera(300, 300, 1000.0, look_at_m=(0.1, shift / 1000), roll_rad=roll)
-    mask = darkness(Strand(Curve.from_curvature(0.0, 0.2), 0.0203, INK, overhang_m=0.3), camera, blur)
+    mask = darkness(Strand(of_curvature(0.0, 0.2), 0.0203, INK, overhang_m=0.3), camera, blur)
     columns = slice(80, 220)
     moment = (mask * np.arange(300)[:, None]).sum(0)[columns] / mask.sum(0)[columns]
     # The axis lies `shift` px from the middle, against the rolled v axis (-sin, cos).
@@ -54,7 +55,7 @@ def test_straight_bar_has_the_midline_and_width_of_its_formula(roll: float, shif
 def test_circular_cable_has_the_midline_of_its_circle(radius_px: float, width_px: float) -> None:
     scale, blur = 10_000.0, 0.8
     kappa = scale / radius_px
-    curve = Curve.from_curvature(kappa, 2.0 / kappa)
+    curve = of_curvature(kappa, 2.0 / kappa)
     camera = Camera(900, 400, scale, look_at_m=(0.5 * curve.chord, float(curve.y.max()) - 0.005), mirrored=True)
     mask = darkness(Strand(curve, width_px / scale, INK), camera, blur)
     cu, cv = (float(a) for a in camera.project(0.5 * curve.chord, curve.y.max() - 1 / kappa))
@@ -82,7 +83,7 @@ def test_covered_part_of_a_pixel_is_the_area_beside_a_line() -> None:
 
 
 def test_curve_of_constant_curvature_is_a_circle() -> None:
-    curve = Curve.from_curvature(8.0, 0.2)
+    curve = of_curvature(8.0, 0.2)
     assert curve.chord == pytest.approx(2 / 8.0 * sin(0.8), rel=1e-13)
     assert curve.y.max() == pytest.approx((1 - cos(0.8)) / 8.0, rel=1e-12)
     assert curve.theta[0] == pytest.approx(0.8, rel=1e-12)
@@ -123,7 +124,7 @@ def test_camera_keeps_its_word() -> None:
 
 
 def test_truth_is_the_camera_of_the_curve() -> None:
-    curve = Curve.from_curvature(lambda s: 2 + 7 * np.sin(pi * s / 0.18), 0.18)
+    curve = of_curvature(lambda s: 2 + 7 * np.sin(pi * s / 0.18), 0.18)
     cable = Strand(curve, place_m=(0.01, 0.005), angle_rad=0.1)
     picture = render(Scene(cable, Camera(1200, 600, 5000.0, mirrored=True), sensor=Sensor(noise=0.0)))
     scale = 5000.0
@@ -137,7 +138,7 @@ def test_truth_is_the_camera_of_the_curve() -> None:
 
 def test_cover_is_a_disc_on_the_axis() -> None:
     camera = Camera(300, 200, 5000.0, look_at_m=(0.0123, 0.0004), distance_m=inf)
-    cable = Strand(Curve.from_curvature(1.0, 0.02), 0.001, INK)
+    cable = Strand(of_curvature(1.0, 0.02), 0.001, INK)
     cover = Cover(0.008, (0.0, 0.0, 0.0), dot_m=0.0, sheen=0.0)
     scene = Scene(cable, camera, (cover, None), SHEET, WHITE, sensor=Sensor(blur_px=0.8, noise=0.0, bit_depth=16))
     both = 1.0 - render(scene).pixels / LEVEL
@@ -153,7 +154,7 @@ def test_cover_is_a_disc_on_the_axis() -> None:
 
 def test_chessboard_photo_shows_the_exact_corners() -> None:
     camera = Camera(1200, 700, 5000.0, k1=-0.02, roll_rad=0.03, perspective_per_m=(0.05, 0.02), distance_m=0.5)
-    scene = Scene(Strand(Curve.from_curvature(1.0, 0.1)), camera, sensor=Sensor(blur_px=0.8, noise=0.003))
+    scene = Scene(Strand(of_curvature(1.0, 0.1)), camera, sensor=Sensor(blur_px=0.8, noise=0.003))
     board = ChessBoard(11, 6, 0.012, place_m=(0.088, 0.032), rotation=(0.1, -0.05, 0.02), height_m=-0.0023)
     found, corners = cv2.findChessboardCorners(render_board(scene, board), (11, 6))
     assert found
@@ -182,7 +183,7 @@ def test_shading_of_a_cylinder() -> None:
 
 
 def test_same_scene_same_picture_and_seed_changes_noise_only() -> None:
-    cable = Strand(Curve.from_curvature(6.0, 0.1), sheath=Sheath(text="NYM 3x1.5", stripe=0.2, strands=0.1))
+    cable = Strand(of_curvature(6.0, 0.1), sheath=Sheath(text="NYM 3x1.5", stripe=0.2, strands=0.1))
     things = (
         Thing("ruler", (0.05, 0.06), (0.08, 0.01)),
         Thing("pen", (0.03, 0.05)),
@@ -199,7 +200,7 @@ def test_same_scene_same_picture_and_seed_changes_noise_only() -> None:
 @pytest.mark.parametrize("bit_depth", [8, 12, 16])
 @pytest.mark.parametrize("kind", ["plain", "brushed", cloth, wood, stone, squared])
 def test_every_ground_in_every_format(kind: str | Texture, bit_depth: int, mode: str) -> None:
-    cable = Strand(Curve.from_curvature(6.0, 0.1))
+    cable = Strand(of_curvature(6.0, 0.1))
     sensor = Sensor(bit_depth=bit_depth, mode=mode, noise=0.0)
     scene = Scene(cable, Camera(300, 200, 1500.0), ground=Ground(kind, (0.5, 0.5, 0.5), 0.05), sensor=sensor)
     pixels = render(scene).pixels
@@ -211,13 +212,13 @@ def test_every_ground_in_every_format(kind: str | Texture, bit_depth: int, mode:
 
 
 def test_cable_outside_the_picture_leaves_the_ground() -> None:
-    cable = Strand(Curve.from_curvature(6.0, 0.1), place_m=(5.0, 5.0))
+    cable = Strand(of_curvature(6.0, 0.1), place_m=(5.0, 5.0))
     scene = Scene(cable, Camera(300, 200, 1500.0), light=SHEET, ground=WHITE, sensor=Sensor(noise=0.0, bit_depth=16))
     assert np.unique(render(scene).pixels).tolist() == [LEVEL]
 
 
 def test_noise_has_the_spread_asked_for() -> None:
-    cable = Strand(Curve.from_curvature(6.0, 0.01))
+    cable = Strand(of_curvature(6.0, 0.01))
     sensor = Sensor(noise=0.02, shot_noise=0.03, bit_depth=16)
     scene = Scene(cable, Camera(900, 600, 1500.0), (None, None), ground=Ground("plain", (0.5, 0.5, 0.5)), sensor=sensor)
     corner = render(scene).pixels[:200] / 65535

@@ -15,15 +15,16 @@ from pipeline.records import Rejected
 from pipeline.vision.bearings.covers import BearingHints
 from pipeline.vision.judgement import Cable
 from pipeline.vision.photo import Photo
-from pipeline.vision.render import Camera, Cover, Curve, Ground, Light, Picture, Scene, Sensor, Strand
+from pipeline.vision.render import Camera, Cover, Ground, Light, Picture, Scene, Sensor, Strand
 from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.segmentation import find_cable
+from tests.pipeline.vision.curves import of_curvature
 from tests.pipeline.vision.drawn import drawn
 
 SCALE = 5_500.0
 LENGTH, DIAMETER, COVER = 0.17, 0.0046, 0.012
-CURVE = Curve.from_curvature(lambda s: 5.0 + 3.0 * np.sin(pi * s / LENGTH), LENGTH)
+CURVE = of_curvature(lambda s: 5.0 + 3.0 * np.sin(pi * s / LENGTH), LENGTH)
 CAMERA = Camera(1150, 480, SCALE, look_at_m=(0.5 * CURVE.chord, 0.022))
 GREY = (0.75,) * 3
 COLOUR = Sensor(mode="colour", noise=0.01)
@@ -98,7 +99,7 @@ LOOKS: dict[str, dict[str, object]] = {
             Thing("text", (0.09, -0.012), (0.05, 0.006), 0.0, (0.1,) * 3, "Probe 7b"),
         )
     },
-    "a second, shorter cable": {"others": (Strand(Curve.from_curvature(3.0, 0.05), DIAMETER, place_m=(0.06, 0.045)),)},
+    "a second, shorter cable": {"others": (Strand(of_curvature(3.0, 0.05), DIAMETER, place_m=(0.06, 0.045)),)},
 }
 
 
@@ -244,7 +245,7 @@ def test_given_axes_cut_a_cable_that_goes_on_behind_them() -> None:
 
 
 SECOND = Strand(CURVE, DIAMETER, place_m=(0.0, 0.022))
-ACROSS = Strand(Curve.from_curvature(0.1, 0.06), DIAMETER, place_m=(0.06, 0.02), angle_rad=1.0)
+ACROSS = Strand(of_curvature(0.1, 0.06), DIAMETER, place_m=(0.06, 0.02), angle_rad=1.0)
 ASIDE = replace(CAMERA, look_at_m=(0.14, 0.022))
 CLOTH = Ground(cloth, GREY, 0.03)
 
@@ -289,7 +290,7 @@ def test_a_poor_photo_that_a_person_would_trace_is_traced(changes: dict[str, obj
 @pytest.mark.parametrize("turn", [1.35, 1.45, 1.55, 1.7, 1.85])
 def test_cable_that_crosses_itself_is_refused(turn: float, ground: Ground, cable: Cable) -> None:
     # the two straight ends cross at an angle of turn - 1 half circles, from 63 to 153 degrees
-    loop = Curve.from_curvature(turn * pi / 0.16, 0.16)
+    loop = of_curvature(turn * pi / 0.16, 0.16)
     look = (0.5 * loop.chord, 0.5 * float(loop.y.max() + loop.y.min()))
     strand = Strand(loop, DIAMETER, overhang_m=0.10 if turn < 1.7 else 0.05)
     camera = Camera(1000, 1000, SCALE, look_at_m=look)
@@ -318,7 +319,7 @@ def test_empty_table_is_refused() -> None:
 
 
 def test_cable_that_lies_on_itself_is_refused() -> None:
-    ring = Curve.from_curvature(2.4 * pi / 0.2, 0.2)
+    ring = of_curvature(2.4 * pi / 0.2, 0.2)
     camera = Camera(700, 700, SCALE, look_at_m=(0.5 * ring.chord, 0.5 * float(ring.y.max() + ring.y.min())))
     outcome, _ = find(scene(cable=Strand(ring, DIAMETER, overhang_m=0.03), camera=camera, covers=(None, None)), UNKNOWN)
     assert isinstance(outcome, Rejected)
@@ -327,7 +328,7 @@ def test_cable_that_lies_on_itself_is_refused() -> None:
 
 @pytest.mark.parametrize("cable", [UNKNOWN, Cable(DIAMETER * SCALE)], ids=["nothing known", "diameter known"])
 def test_piece_of_a_cable_that_leaves_the_frame_is_not_taken_for_it(cable: Cable) -> None:
-    loop = Curve.from_curvature(1.25 * pi / 0.16, 0.16)
+    loop = of_curvature(1.25 * pi / 0.16, 0.16)
     camera = Camera(1000, 1000, SCALE, look_at_m=(0.5 * loop.chord, 0.5 * float(loop.y.max() + loop.y.min())))
     strand = Strand(loop, DIAMETER, overhang_m=0.10)
     # the texture tears the mask of the cable at some levels

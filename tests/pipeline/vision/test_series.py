@@ -27,6 +27,7 @@ from pipeline.vision.render.sheath import Sheath
 from pipeline.vision.rough import RoughCable
 from pipeline.vision.series import trace_series
 from pipeline.vision.single import trace_photo
+from tests.pipeline.vision.curves import of_curvature
 
 SETTINGS = VisionSettings()
 # the covers of these scenes lie in the plane: seen from so far away, any height does
@@ -39,7 +40,7 @@ TENTH_OF_A_PIXEL = 0.1 / SCALE
 
 
 def arch(bend: float) -> Curve:
-    return Curve.from_curvature(lambda s: bend * np.sin(pi * s / LENGTH) + 1.0, LENGTH)
+    return of_curvature(lambda s: bend * np.sin(pi * s / LENGTH) + 1.0, LENGTH)
 
 
 CURVES = [arch(bend) for bend in (2.0, 5.0, 8.0)]

@@ -8,15 +8,16 @@ import pytest
 
 from pipeline.settings.vision import VisionSettings
 from pipeline.vision.centerline.side import on_one_side, reflected
-from pipeline.vision.render import Camera, Curve
+from pipeline.vision.render import Camera
 from pipeline.vision.series import trace_series
+from tests.pipeline.vision.curves import of_curvature
 from tests.pipeline.vision.test_series import DIAMETER, LENGTH, SCALE, series
 
 SETTINGS = VisionSettings()
 
 
 def bent(amplitude, rest):
-    return Curve.from_curvature(lambda s: amplitude * np.sin(pi * s / LENGTH) + rest, LENGTH)
+    return of_curvature(lambda s: amplitude * np.sin(pi * s / LENGTH) + rest, LENGTH)
 
 
 @pytest.fixture
