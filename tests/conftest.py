@@ -5,11 +5,16 @@ tests marked ``shared`` are left out, and the head of the report says so and how
 
 Tests marked ``browser`` open a report in Chromium. Without it they do not run, and the last lines say how many and what
 installs it; with ``CABLEBEND_BROWSER=required`` they fail instead.
+
+Where ``CABLEBEND_UNTIL`` says a time (seconds since the epoch), the files that take minutes come last, and none of
+their tests begins after it: CI has 90 minutes, and machines differ by a factor of three. The last lines name those that
+did not run.
 """
 
 import os
 import shutil
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -36,6 +41,10 @@ def pytest_report_header() -> str:
     return f"shared specimens: none in {SHARED}; tests that read them are left out, set CABLEBEND_SHARED to run them"
 
 
+TIMED = "CABLEBEND_UNTIL" in os.environ
+UNTIL = float(os.environ.get("CABLEBEND_UNTIL", "inf"))
+LATE = "no time left"
+
 LONG = (
     "test_hidden_effects",
     "test_unnamed",
@@ -50,8 +59,14 @@ LONG = (
 """Files that take minutes, the longest first: a file goes to one worker, and one that came last would keep it alone."""
 
 
+def turn(item) -> tuple[bool, int]:
+    """When a test has its turn."""
+    known = item.path.stem in LONG
+    return known == TIMED, LONG.index(item.path.stem) if known else 0
+
+
 def pytest_collection_modifyitems(config, items):
-    items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
+    items.sort(key=turn)
     if not SHARED.is_dir():
         left_out = [item for item in items if item.get_closest_marker("shared")]
         config.hook.pytest_deselected(items=left_out)
@@ -59,6 +74,8 @@ def pytest_collection_modifyitems(config, items):
 
 
 def pytest_runtest_setup(item):
+    if time.time() > UNTIL and item.path.stem in LONG:
+        pytest.skip(LATE)
     missing = [name for name, path in BROWSER.items() if path is None]
     if missing and item.get_closest_marker("browser"):
         end = pytest.fail if os.environ.get("CABLEBEND_BROWSER") == "required" else pytest.skip
@@ -66,7 +83,14 @@ def pytest_runtest_setup(item):
 
 
 def pytest_terminal_summary(terminalreporter):
-    without = sum("browser" in report.keywords for report in terminalreporter.stats.get("skipped", ()))
+    skipped = terminalreporter.stats.get("skipped", ())
+    late = [report.nodeid for report in skipped if LATE in str(report.longrepr)]
+    if late:
+        terminalreporter.section("time")
+        terminalreporter.line(f"{len(late)} tests did not run, as it was later than CABLEBEND_UNTIL:")
+        for test in late:
+            terminalreporter.line(test)
+    without = sum("browser" in report.keywords for report in skipped)
     if without:
         terminalreporter.section("browser")
         terminalreporter.line(f"{without} browser tests did not run: no Chromium with its driver was found;")
