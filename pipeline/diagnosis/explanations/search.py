@@ -1,10 +1,10 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what has no name, beside the likeliest four; in forms that fit nearly anything, unless one cause is surely there
-and leaves no more than noise -> what is likely beside these -> causes exchanged while a pair that shares one with the
-likeliest is likelier -> pairs pruned of what they do not need -> where something else is
-likelier still, the nearest cause with all others that show beside it -> probabilities of all.
+-> what has no name, beside the likeliest; forces and moments only where no single cause is surely there and leaves
+noise -> what is likely beside these -> causes exchanged while a pair that shares one with the likeliest is likelier ->
+pairs pruned of what they do not need -> where something else is likelier still, the nearest cause with all others that
+show beside it -> probabilities of all.
 
 A pair is fitted as far as chi-square may fall to where it were worth a hundredth of what is likeliest.
 
