@@ -1,10 +1,9 @@
 """The search: which causes, and which pairs of them, are fitted in full, and what each is worth.
 
 base model and scores -> causes weighed by the linear model -> those that matter, or come near the best score, refitted
--> what has no name, beside the likeliest; forces and moments only where no single cause is surely there and leaves
-noise -> what is likely beside these -> causes exchanged while a pair that shares one with the likeliest is likelier ->
-pairs pruned of what they do not need -> where something else is likelier still, the nearest cause with all others that
-show beside it -> probabilities of all.
+-> what has no name, beside the likeliest four -> what is likely beside these -> causes exchanged while a
+pair that shares one with the likeliest is likelier -> pairs pruned of what they do not need -> where something else is
+likelier still, the nearest cause with all others that show beside it -> probabilities of all.
 
 A pair is fitted as far as chi-square may fall to where it were worth a hundredth of what is likeliest.
 
@@ -42,7 +41,7 @@ from pipeline.diagnosis.fits.search import Suspicion, beside_usual, suspect
 from pipeline.diagnosis.fits.workbench import Workbench
 from pipeline.diagnosis.posterior.error_grid import ErrorGrid, error_grid
 from pipeline.diagnosis.posterior.explanation import Explanation, explanation_of
-from pipeline.diagnosis.posterior.hypotheses import ALIKE, LEVEL, SHARES, Hypothesis, Posterior, posterior
+from pipeline.diagnosis.posterior.hypotheses import ALIKE, SHARES, Hypothesis, Posterior, posterior
 from pipeline.diagnosis.posterior.weigh import Weighed, refitted, weighed
 from rod.inverse.base_fit import settled
 from rod.inverse.extension import Term
@@ -77,23 +76,16 @@ class Search:
         return posterior(self.hypotheses, self.causes)
 
     def add(self, found: Sequence[Explanation]) -> list[Explanation]:
-        """Weigh refits, likeliest first; what is among the likeliest is fitted to the end, and with something else."""
+        """Weigh refits and return them; what is among the likeliest is fitted to the end, and with something else."""
         new = [(refitted(self.grid.plain, one, self.bench.facts).plain, one) for one in found]
         new.sort(key=lambda pair: -pair[0])
         known = [one.plain for one in self.hypotheses if one.found is not None]
         least = min(sorted([*known, *(plain for plain, _ in new)])[-LIKELIEST:], default=0.0)
         rest, hopeless = self.hypotheses[0].rest, far_behind(self._least(found))
-        done = list[Explanation]()
-        for plain, one in new:
-            if plain >= least:
-                done.append(self._settled(one, hopeless))
-                self.hypotheses.append(refitted(self.grid, done[-1], self.bench.facts))
-                # beside what is surely there and leaves noise nothing far less likely is worth more by something else
-                least = max(least, self._top + np.log(ALSO)) if self._settled_by_one else least
-            else:
-                done.append(one)
-                self.hypotheses.append(Hypothesis(one.causes, plain, rest, one))
-        return done
+        best = [self._settled(one, hopeless) for plain, one in new if plain >= least]
+        others = [Hypothesis(one.causes, plain, rest, one) for plain, one in new if plain < least]
+        self.hypotheses += [*(refitted(self.grid, one, self.bench.facts) for one in best), *others]
+        return [*best, *(one for plain, one in new if plain < least)]
 
     def _least(self, new: Sequence[Explanation] = ()) -> float:
         """Smallest chi-square of all refits of named causes; infinite without any."""
@@ -250,8 +242,7 @@ class Search:
     def unnamed(self) -> None:
         """What has no name in the catalogue: moments beside the base model, what begins beside the likeliest causes."""
         base, bench = explanation_of((), self.bench.base, self.bench.base), self.bench
-        likeliest = self.posterior.explanations()[: 1 if self._settled_by_one else LIKELIEST]
-        known = [base, *(found.found for found in likeliest if found.found)]
+        known = [base, *(found.found for found in self.posterior.explanations()[:LIKELIEST] if found.found)]
         hopeless = min(one.fitted.chi2 for one in known) + LEAST
         for one in known:
             about = suspect(bench.observation, one.fitted, (*BEGUN, LEVER))
@@ -263,15 +254,8 @@ class Search:
             usable = (found for found in fits if found is not None and found.run.prediction is not None)
             whole = (found if found.converged else settled(bench.observation, found) for found in usable)
             self._weigh_unnamed(one.causes, whole)
-        for unknown in () if self._settled_by_one else UNKNOWN:
+        for unknown in UNKNOWN:
             self._weigh_unknown(unknown, hopeless)
-
-    @property
-    def _settled_by_one(self) -> bool:
-        """Whether one cause is surely there and leaves nothing to be explained besides."""
-        first = self.posterior.believed[0]
-        found = None if first.something_else or first.probability < LEVEL else first.found
-        return found is not None and found.fitted.leaves_noise
 
     def _weigh_unknown(self, unknown: Unknown, hopeless: float) -> None:
         """Forces or moments at each place, then of the size that they say themselves, with more beside, and begins.

@@ -6,9 +6,7 @@ import pytest
 from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
 from fixtures.hidden import hidden_test
 from pipeline.diagnosis.causes import CATALOGUE
-from pipeline.diagnosis.causes.unnamed import UNKNOWN
 from pipeline.diagnosis.explanations.refit import fit_term
-from pipeline.diagnosis.explanations.search import Search, searched
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.faults import faults_of_input
 from pipeline.settings.diagnosis import DiagnosisSettings
@@ -46,17 +44,3 @@ def test_a_form_is_fitted_only_where_its_score_promises_a_quarter_of_what_is_ask
     asked = bench.base.chi2 - 1.1 * PROMISED * gain[least]
     assert fit_term(bench.observation, bench.base, bench.suspicion, least, hopeless=asked) is None
     assert fit_term(bench.observation, bench.base, bench.suspicion, least) is not None
-
-
-def test_forces_without_a_name_would_change_nothing_beside_a_cause_that_is_surely_there(bench, monkeypatch):
-    short = searched(bench).posterior
-    assert not any(
-        term.cause in UNKNOWN for one in short.believed if one.found for term in one.found.fitted.extension.terms
-    )
-    monkeypatch.setattr(Search, "_settled_by_one", False)
-    long = searched(bench).posterior
-    assert any(term.cause in UNKNOWN for one in long.believed if one.found for term in one.found.fitted.extension.terms)
-    assert short.word == long.word == "causes"
-    assert short.believed[0].causes == long.believed[0].causes
-    # a twentieth of what a probability is good for, 0.03
-    assert short.believed[0].probability == pytest.approx(long.believed[0].probability, abs=0.0015)
