@@ -80,12 +80,6 @@ class Fit:
         return self.chi2 / max(len(self.residual) - self.extension.size, 1)
 
     @property
-    def leaves_noise(self) -> bool:
-        """Whether no more is left than noise leaves in 19 of 20 tests."""
-        freedom = len(self.residual) - self.extension.size
-        return self.converged and self.chi2 < freedom + 2.0 * float(np.sqrt(2.0 * freedom))
-
-    @property
     def covariance(self) -> Array:
         """Covariance (p, p) of the parameters; invisible combinations get a huge variance, not an infinite one."""
         size = np.linalg.norm(self.jacobian, axis=0)

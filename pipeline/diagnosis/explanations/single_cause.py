@@ -89,7 +89,8 @@ def _by_kind(
         found = _fit_form(observation, base, suspicion, direction, hopeless=hopeless)
         if found is None:
             continue
-        if found.leaves_noise:
+        freedom = len(found.residual) - found.extension.size
+        if found.converged and found.chi2 < freedom + 2.0 * np.sqrt(2.0 * freedom):
             enough[term.variant.label] = term.size
         best[kind_of(term)] = min(best.get(kind_of(term), found), found, key=cost)
         if not (term.cause.additive or term.variant.component):  # of forms that stand alone those near the best stay
