@@ -39,8 +39,9 @@ FAR, CRAWL_FAR = 16.0, 1e-2
 that no model explains else kept every one of hundreds of fits at work on a hundredth of its misfit."""
 
 PROMISED = 4.0
-"""Of what the linear model promises: as much as a fit is trusted to gain in all. Friction, the most curved of causes,
-gained 2.8 times that; most fits that cannot come near what another one has reached are seen by it at their start."""
+"""Of what the linear model promises: as much as a fit is trusted to gain in all. Of 590 fits in nine trials one that
+came near what another had reached gained more, 6.5 times (forces without a name, of no weight); of causes friction
+gained most, 2.8 times."""
 
 PART = 0.4
 """Share of a step that leads too far; where amount and stiffness act as a product, halves of a step did."""

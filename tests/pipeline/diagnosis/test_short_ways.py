@@ -1,4 +1,4 @@
-"""What is not fitted, since it could change nothing: and that it changes nothing."""
+"""What is not fitted to the end, or not at all, since the linear model promises too little."""
 
 import numpy as np
 import pytest
