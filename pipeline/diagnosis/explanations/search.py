@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 
@@ -45,10 +45,14 @@ from pipeline.diagnosis.posterior.hypotheses import ALIKE, SHARES, Hypothesis, P
 from pipeline.diagnosis.posterior.weigh import Weighed, refitted, weighed
 from rod.inverse.base_fit import settled
 from rod.inverse.extension import Term
-from rod.inverse.fit import FITS, Fit, fit
+from rod.inverse.fit import FITS, Fit, evaluated, fit, shown
 
 LIKELIEST = 4
 """Refits, the likeliest first, that are weighed with something else besides; single causes that pairs begin with."""
+
+BEYOND = 2.0
+"""Times what the linear model promises of forces without a name, in log evidence: no fit is trusted to gain more. Of
+58 kinds of them in 15 tests one that was of weight gained 1.2 times its promise, and none more than 1.6 times."""
 
 NEEDED = 2.5
 """Standard deviations from nothing that each member of a pair must have to be left in it."""
@@ -274,14 +278,33 @@ class Search:
                 best = max([best, *tried([of_size(known, size)], _fit_of(best))], key=attrgetter("rest"))
             return best
 
-        found = tried((unknown.ways(facts, at, SIZES[-1]) for at in unknown.places.values()), base, hopeless)
-        if not found:
+        ways = (unknown.ways(facts, at, SIZES[-1]) for at in unknown.places.values())
+        promised = [(value, terms) for terms in ways if (value := self._linear_gain(terms)) is not None]
+        gain, terms = max(promised, key=itemgetter(0), default=(-np.inf, ()))
+        if BEYOND * gain < self._top - self.hypotheses[0].plain + np.log(ALSO) or not (
+            found := tried([terms], base, hopeless)
+        ):
             return
-        best = sized(max(found, key=attrgetter("rest")))
+        best = sized(found[0])
         more = tried((of_size(terms, SIZES[-1]) for terms in unknown.freer(best.terms)), _fit_of(best))
         best = max([best, *map(sized, more)], key=attrgetter("rest"))
         if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
             tried(unknown.since(best.terms, facts), _fit_of(best), hopeless)
+
+    def _linear_gain(self, terms: tuple[Term, ...]) -> float | None:
+        """Log evidence that the linear model promises of forces or moments, of the size that they say themselves."""
+        bench, base = self.bench, self.bench.base
+        extension = replace(base.extension, terms=terms)
+        here = shown(bench.observation, extension, extension.start(base.vector, (0.0,) * len(terms)), base.run)
+        begin = evaluated(bench.observation, extension, here)
+        if here.run.prediction is None:
+            return None
+        move = np.linalg.lstsq(begin.jacobian, begin.residual, rcond=None)[0]
+        size = size_told(replace(begin, vector=begin.vector + move))
+        own = replace(extension, terms=of_size(terms, size))
+        table = np.vstack([begin.jacobian[: bench.observation.rows.count], own.prior])
+        promised = explanation_of((), base, replace(begin, extension=own, jacobian=table))
+        return refitted(self.grid.plain, promised, bench.facts).rest - self.hypotheses[0].plain
 
     def _with(self, every: Iterable[tuple[Term, ...]], near: Fit, hopeless: float) -> Iterator[Fit]:
         """The base model with terms, fitted from a fit ``near`` and from what these terms make alike in it."""
