@@ -50,12 +50,14 @@ class InternalFriction:
     stick_curvature : 1/m
         Curvature change from the relaxed state after which all elements slip; positive.
     elements : int
-        Elements slip one after the other at stick_curvature * (1..elements) / elements: one is a sharp stick-slip,
-        several a rounded loop. Three follow a smooth loop to a few per cent.
+        Elements slip one after the other at stick_curvature * ((1..elements) / elements)^spread: one is a sharp
+        stick-slip, several a rounded loop. Three follow a smooth loop to a few per cent.
     gradual : bool
         Whether all give way gradually, as Dahl's, each with its stick_curvature as the decay of what still sticks.
     beside : InternalFriction or None
         Further elements acting in parallel: a loop of any form is a sum of such groups.
+    spread : float
+        Evenly with 1; with 0 all slip at once, above 1 most of them early.
     """
 
     half_width: float
@@ -63,15 +65,16 @@ class InternalFriction:
     elements: int = 3
     gradual: bool = False
     beside: InternalFriction | None = None
+    spread: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (self.half_width >= 0.0 and self.stick_curvature > 0.0 and self.elements >= 1):
-            raise ValueError(f"need half_width >= 0, stick_curvature > 0 and elements >= 1, got {self}")
+        if not (self.half_width >= 0.0 and self.stick_curvature > 0.0 and self.elements >= 1 and self.spread >= 0.0):
+            raise ValueError(f"need half_width >= 0, stick_curvature > 0, elements >= 1 and spread >= 0, got {self}")
 
     @cached_property
     def stick(self) -> Array:
         """Curvature change c_e to slip of each element, (count, 1) 1/m; those beside follow."""
-        own = self.stick_curvature * np.arange(1, self.elements + 1)[:, None] / self.elements
+        own = self.stick_curvature * (np.arange(1, self.elements + 1)[:, None] / self.elements) ** self.spread
         return own if self.beside is None else np.vstack([own, self.beside.stick])
 
     @cached_property

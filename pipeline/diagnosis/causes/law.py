@@ -1,7 +1,8 @@
 """What the characteristic may be beyond the base model: its form, friction between the wires, and set.
 
 nonlinear_stiffness  the law of the base model may have any form; a cause in the paper's own two steps alone
-hysteresis           elements beside the law that slip, at once or gradually (see `rod.section.InternalFriction`)
+hysteresis           wires beside the law that slip one after the other, or all at once (``width`` 0), or give way
+                     gradually (see `rod.section.InternalFriction`)
 plastic_set          K0 grows with the largest curvature reached, where it was reached; the law moves along or stays
                      (see `rod.section`); or all along the cable, alike or in a half sine, with the largest of all;
                      in proportion, beyond a threshold (``width``), ever more slowly or quickly (``at``, its saturation)
@@ -47,8 +48,11 @@ class NonlinearStiffness(Cause):
         return model
 
 
-GRADUAL = "that gives way gradually"
-"""Label of Dahl's form of friction."""
+ONE_BY_ONE, GRADUAL = "one after the other", "that gives way gradually"
+"""Labels of the forms of friction: of wires that stick until they slip, and Dahl's."""
+
+WIRES = 6
+"""Elements of one form: a smooth loop to one part in seventy of its height."""
 
 
 class Hysteresis(Cause):
@@ -67,19 +71,21 @@ class Hysteresis(Cause):
         return 0.1 * facts.moment_scale
 
     def variants(self, facts: Facts) -> tuple[Variant, ...]:
-        """Friction that slips after some share of the range of curvatures, at once or gradually.
+        """Friction that slips within some share of the range of curvatures, at its end all at once, or gradually.
 
+        A refit says how wires slip one after the other: toward the end, evenly (``width`` 1), or most of them early.
         Sums of the first are loops by Masing's rule, of the second Dahl's. On loading alone both are part of the law.
         """
         # what has not slipped over the whole range is elastic, and no other than the law itself; of what gives way
         # gradually a seventh still sticks once the curvature has changed by twice as much as it decays over
-        kinds, scale = (("with a sharp corner", 1.0), (GRADUAL, 0.5)), facts.curvature_scale
+        kinds, scale = ((ONE_BY_ONE, 1.0), (GRADUAL, 0.5)), facts.curvature_scale
         return tuple(
             Variant(
                 label,
                 at=share * part * scale,
-                tuned=("at",),
+                tuned=("at",) if label == GRADUAL else ("at", "width"),
                 at_range=(0.01 * scale, 0.9 * part * scale),
+                width_range=(0.0, 2.0),
                 of_law=not facts.returns,
             )
             for label, part in kinds
@@ -87,9 +93,10 @@ class Hysteresis(Cause):
         )
 
     def apply(self, model: Model, amount: float, variant: Variant, facts: Facts) -> Model:
-        """Friction of half width ``amount`` that slips after a curvature change ``at``, beside what there is."""
-        gradual, beside = variant.label == GRADUAL, model.bending.friction
-        friction = InternalFriction(max(amount, 0.0), variant.at, 1, gradual, beside)
+        """Friction of half width ``amount`` that has slipped after a curvature change ``at``, beside what there is."""
+        gradual, known, spread = variant.label == GRADUAL, model.bending.friction, max(variant.width, 0.0)
+        elements = 1 if gradual else WIRES
+        friction = InternalFriction(max(amount, 0.0), variant.at, elements, gradual, beside=known, spread=spread)
         return replace(model, bending=replace(model.bending, friction=friction))
 
 

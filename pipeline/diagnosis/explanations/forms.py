@@ -67,12 +67,18 @@ def _spread(observation: Observation, fitted: Fit, cause: Cause, forms: Sequence
     if spread.run.prediction is None:
         return fitted
     amounts = zip(forms, spread.vector[len(vector) :], strict=True)
-    needed = [(Term(cause, form), amount) for form, amount in amounts if amount > LEAST_SHARE * total]
+    needed = [(form, amount) for form, amount in amounts if amount > LEAST_SHARE * total]
     if not needed:
         return fitted
-    start = np.concatenate([spread.vector[: len(vector)], *(term.numbers(amount) for term, amount in needed)])
-    found = fit(observation, replace(rest, terms=(*rest.terms, *(term for term, _ in needed))), start, near=spread.run)
-    return fitted if found.run.prediction is None else without_needless_forms(observation, found, cause)
+    found = [fitted]
+    for places in dict.fromkeys([("at",), *(form.tuned for form, _ in needed)]):  # then with widths as well
+        some = [(Term(cause, replace(form, tuned=places[: len(form.tuned)])), amount) for form, amount in needed]
+        start = np.concatenate([spread.vector[: len(vector)], *(term.numbers(amount) for term, amount in some)])
+        extension = replace(rest, terms=(*rest.terms, *(term for term, _ in some)))
+        whole = fit(observation, extension, start, near=spread.run)
+        if whole.run.prediction is not None:
+            found.append(without_needless_forms(observation, whole, cause))
+    return min(found, key=cost)
 
 
 def without_needless_forms(observation: Observation, fitted: Fit, cause: Cause) -> Fit:

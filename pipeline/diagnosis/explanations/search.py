@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 
 import numpy as np
 
@@ -262,7 +262,7 @@ class Search:
             self._weigh_unknown(unknown, hopeless)
 
     def _weigh_unknown(self, unknown: Unknown, hopeless: float) -> None:
-        """Forces or moments at each place, then of the size that they say themselves, with more beside, and begins.
+        """Forces or moments where they promise most, then of the size that they say themselves, with more, and begins.
 
         From a large size down: of a small one a fit stays beside the small forces that a wrong model is content with.
         """
@@ -279,11 +279,11 @@ class Search:
             return best
 
         ways = (unknown.ways(facts, at, SIZES[-1]) for at in unknown.places.values())
-        promised = [(value, terms) for terms in ways if (value := self._linear_gain(terms)) is not None]
-        gain, terms = max(promised, key=itemgetter(0), default=(-np.inf, ()))
-        if BEYOND * gain < self._top - self.hypotheses[0].plain + np.log(ALSO) or not (
-            found := tried([terms], base, hopeless)
-        ):
+        promised = {terms: self._linear_gain(terms) for terms in ways}
+        most = max(promised, key=promised.__getitem__)
+        needed = self._top + np.log(ALSO) - self.hypotheses[0].plain
+        found = tried([most], base, hopeless) if BEYOND * promised[most] > needed else []
+        if not found:
             return
         best = sized(found[0])
         more = tried((of_size(terms, SIZES[-1]) for terms in unknown.freer(best.terms)), _fit_of(best))
@@ -291,14 +291,14 @@ class Search:
         if any(one.found is best.found and one.probability > ALSO for one in self.posterior.beside_something_else()):
             tried(unknown.since(best.terms, facts), _fit_of(best), hopeless)
 
-    def _linear_gain(self, terms: tuple[Term, ...]) -> float | None:
+    def _linear_gain(self, terms: tuple[Term, ...]) -> float:
         """Log evidence that the linear model promises of forces or moments, of the size that they say themselves."""
         bench, base = self.bench, self.bench.base
         extension = replace(base.extension, terms=terms)
         here = shown(bench.observation, extension, extension.start(base.vector, (0.0,) * len(terms)), base.run)
         begin = evaluated(bench.observation, extension, here)
         if here.run.prediction is None:
-            return None
+            return -np.inf
         move = np.linalg.lstsq(begin.jacobian, begin.residual, rcond=None)[0]
         size = size_told(replace(begin, vector=begin.vector + move))
         own = replace(extension, terms=of_size(terms, size))

@@ -42,9 +42,9 @@ def refits(
     """
     kind, hopeless = suspicion.causes[cause], rival + LEAST
     found = [*_by_kind(observation, base, suspicion, cause, hopeless=hopeless).values()]
+    # one form or component alone is left beside all of them for the evidence to choose
     if kind.additive:
-        found = [in_all_forms(observation, one, kind, one.extension.terms[-1].variant.setting) for one in found]
-    # one component alone is left beside all of them for the evidence to choose
+        found += [in_all_forms(observation, one, kind, one.extension.terms[-1].variant.setting) for one in found]
     parts = ((one, one.extension.terms[-1]) for one in found)
     found += [
         with_all_components(observation, one, term, hopeless=hopeless) for one, term in parts if term.variant.component

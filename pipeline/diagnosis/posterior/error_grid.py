@@ -3,7 +3,8 @@
 A fit whitens its rows by the noise that is likeliest beforehand. What is known less well is integrated over here:
 
     slow      slow errors of a photo and errors of its bearing axes, times 0.3, 1 or 3
-    waves     errors of each photo along the cable, rough ones as below: none, faint, or as the scatter of a section
+    waves     errors along the cable, rough ones as below, of each photo and as large ones alike on all photos: none,
+              faint, or as the scatter of a section
     hold      an error that all samples of a hold share, of 0 or 1 standard deviation of their mean, and more of both
               as far as few samples leave the level of their noise open
     moved     scatter of the displacements beyond the log's, 0, 10 or 50 um
@@ -61,7 +62,8 @@ SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
 
 WAVES = {0.0: 0.7, 0.3: 0.15, 1.0: 0.15}
 """Waves of a photo, in what single sections scatter, with probabilities beforehand: light, ground and print that no
-photo tells from the cable move its midline by a few hundredths of a pixel, and by as much at most."""
+photo tells from the cable move its midline by a few hundredths of a pixel, and by as much at most. What is printed on a
+cable, or lies in its sheath, does so on all photos alike: of nine specimens drawn by strangers as much as the rest."""
 
 FORCES = (0.0, *np.geomspace(1e-3, 0.3, 5))
 """Of the largest force."""
@@ -198,12 +200,14 @@ def error_grid(observation: Observation, facts: Facts) -> ErrorGrid:
     for smooth, power in zip(over_steps, (2, 1), strict=True):
         shown = _shown(observation, facts, photos, partial(_waves, power=power))
         by_power.append(tuple(_of_photos(observation, photos, root, shown, smooth) for root in roots))
+    rough = _shown(observation, facts, photos, partial(_waves, power=1))
+    noisy = tuple(_of_photos(observation, photos, root, rough, np.eye(count) + 1.0) for root in roots)
     kinds = [Kind((none,) * len(SLOW), held[1], every[:1], 1.0, noise=True)]
     seen = [np.median(photo.sections.section_std) for photo in observation.photos]
     waves = np.array([*WAVES][1:]) * (np.median(seen) if seen else 0.0) / facts.length
     if seen:
         own = np.array([(a, 0) for a in range(len(SHAPES), len(SHAPES) + len(waves))])
-        kinds = [kinds[0]._replace(chance=WAVES[0.0]), Kind(by_power[1], held[1], own, 1.0 - WAVES[0.0], noise=True)]
+        kinds = [kinds[0]._replace(chance=WAVES[0.0]), Kind(noisy, held[1], own, 1.0 - WAVES[0.0], noise=True)]
     kinds += [Kind(shapes, holds, every[1:], 1.0 / 3.0) for shapes, holds in zip(by_power, held, strict=True)]
     bumps = _shown(observation, facts, photos, lambda u: np.exp(-0.5 * (np.subtract.outer(u, PLACES) / WIDTH) ** 2))
     single = _shown(observation, facts, photos, partial(_waves, power=0))

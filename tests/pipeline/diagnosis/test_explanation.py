@@ -13,6 +13,7 @@ from fixtures.memory import Slipping
 from fixtures.scores import refit_one
 from pipeline.diagnosis.causes import SUSPECTS
 from pipeline.diagnosis.explanations.refit import Addition, linear_start
+from pipeline.diagnosis.explanations.single_cause import refits
 from pipeline.diagnosis.fits.extended import curve
 from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.presentation.findings import too_large
@@ -70,6 +71,21 @@ def test_two_elements_that_slip_are_found_as_two():
         assert abs(value - truth) < 4.0 * std and std < 0.1 * truth
     amount, std = found.amount(SUSPECTS[index])
     assert amount == pytest.approx(np.dot(ELEMENTS.stiffness, ELEMENTS.slip), abs=4.0 * std)
+
+
+def test_many_wires_that_slip_one_after_the_other_are_one_form():
+    """Five elements of equal moment, most of which slip early: one form says how many slip by when."""
+    slip = (0.3, 0.6, 1.05, 1.65, 2.4)
+    bench = prepared(Cable(memory=Slipping(tuple(8e-4 / one for one in slip), slip)), 42)
+    index = [cause.name for cause in SUSPECTS].index("hysteresis")
+    several = refits(bench.observation, bench.base, bench.suspicion, index)
+    found = next(one for one in several if len(one.fitted.extension.terms) == 1)
+    (term,), (at,) = found.fitted.extension.terms, found.fitted.extension.amounts_at
+    std = np.sqrt(found.fitted.covariance[at + 1, at + 1])
+    assert found.fitted.vector[at + 1] == pytest.approx(2.4, abs=4.0 * std) and std < 0.3
+    amount, std = found.amount(term.cause)
+    assert amount == pytest.approx(4e-3, abs=4.0 * std) and std < 2e-4
+    assert found.fitted.chi2 < 1.3 * (len(bench.base.residual) - found.fitted.extension.size)
 
 
 def test_springs_of_two_bearings_are_told_apart():

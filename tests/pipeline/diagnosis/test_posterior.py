@@ -9,13 +9,15 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import norm
 
-from fixtures.aliens import with_alien
+from fixtures.aliens import pushed, with_alien
 from fixtures.continuum import Cable
 from fixtures.effects import HIDE, LARGEST, PROTOCOLS, Form
-from fixtures.hidden import LOOP, Reading, hidden_test
+from fixtures.hidden import LOOP, SIX, Reading, hidden_test
 from fixtures.scores import SETTINGS, error_models, exact_bench
 from fixtures.trials import alien_size, random_cable
 from pipeline.diagnosis import diagnose
+from pipeline.diagnosis.diagnose import conclude
+from pipeline.diagnosis.fits.workbench import prepare
 from pipeline.diagnosis.posterior.error_grid import FORCES, HOLD, SLOW, WAVES, hold_sizes
 from pipeline.diagnosis.posterior.evidence import SIZES, as_told, evidence, evidences, moments
 from pipeline.diagnosis.posterior.hypotheses import SHARES, Hypothesis, posterior
@@ -245,6 +247,18 @@ def test_waves_that_are_noise_go_up_to_what_sections_scatter(bench, grid):
     (noise,) = (kind for kind in grid.kinds if kind.noise and len(kind.shapes[0].size))
     sizes = bench.facts.length * grid.shapes[noise.pairs[:, 0]]
     assert sizes == pytest.approx([size * scatter for size in WAVES if size]) and max(sizes) == pytest.approx(scatter)
+
+
+@pytest.mark.parametrize(("size", "noise"), [(4e-6, True), (1.6e-5, False)])
+def test_waves_alike_on_all_photos_are_noise_as_far_as_sections_scatter(size, noise):
+    """What is printed on a cable moves all midlines alike; what moves them more than sections scatter is no print."""
+    test = hidden_test(Cable(), SIX, largest=0.0138, seed=51)
+
+    def print_on_cable(u):
+        return size * (np.sin(6.0 * np.pi * u) + 0.7 * np.sin(9.0 * np.pi * u))
+
+    printed = replace(test, steps=tuple(pushed(step, print_on_cable) for step in test.steps))
+    assert (conclude(prepare(faults_of_input(printed), SETTINGS)).posterior.word == "base") == noise
 
 
 def test_shares_beforehand_sum_to_one():
