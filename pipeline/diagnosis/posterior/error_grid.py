@@ -63,7 +63,8 @@ SHAPES = (0.0, *np.geomspace(1e-6, 1e-2, 7))
 WAVES = {0.0: 0.7, 0.3: 0.15, 1.0: 0.15}
 """Waves of a photo, in what single sections scatter, with probabilities beforehand: light, ground and print that no
 photo tells from the cable move its midline by a few hundredths of a pixel, and by as much at most. What is printed on a
-cable, or lies in its sheath, does so on all photos alike: of nine specimens drawn by strangers as much as the rest."""
+cable, or lies in its sheath, does so on all photos alike: in ten specimens drawn by strangers half as much as what is
+of each photo, in two as much."""
 
 FORCES = (0.0, *np.geomspace(1e-3, 0.3, 5))
 """Of the largest force."""
