@@ -24,8 +24,8 @@ from rod.inverse.fit import Fit
 from rod.inverse.laws import AnyLaw
 from rod.law_prior import Conditioned, conditioned, inverse_root, least
 
-NOTHING = 14.0
-"""Of log p: what lies so far below the largest, a millionth, is nothing whatever the prior of an amount makes of it."""
+NOTHING = 16.0
+"""Of log p: what lies so far below the largest is nothing whatever the prior of an amount makes of it."""
 
 AT_ONCE = 256
 """Error models whose products a processor's cache holds."""
