@@ -228,7 +228,7 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
     refusals = [(one.area, one.outcome, one.path) for one in judged if isinstance(one.outcome, Rejected)]
     if not likely:
         return max(refusals, key=lambda refusal: refusal[0])[1]
-    best = likely[0]
+    best = _widest_alike(likely)
     for _, refusal, path in refusals:
         # other readings of a photo that shows a crossing, or the cable cut, may show one arm of it as a clean strip
         length, beyond = float(step_lengths(path).sum()), _length_beyond(path, best)
@@ -251,6 +251,19 @@ def _chosen(photo: Photo, judged: list[_Judged]) -> RoughCable | Rejected:
         return best
     taken = doubtful("photo/two-candidates.taken", one_px=best.length_px, other_px=max(beside))
     return replace(best, findings=(*best.findings, taken))
+
+
+def _widest_alike(likely: list[RoughCable]) -> RoughCable:
+    """The likeliest strip, or a wider one on its course that is nearly as likely and stands out as much.
+
+    A highlight or a shaded half is a strip within the cable, and nothing doubles a cable.
+    """
+    best = likely[0]
+    for found in likely[1:]:
+        wider = found.half_width_px > _WIDER * best.half_width_px and found.contrast > 0.95 * best.contrast
+        if wider and found.evidence.value > 0.85 * best.evidence.value and lies_on(found, [best.path_px]):
+            best = found
+    return best
 
 
 def _is_piece(found: RoughCable) -> bool:

@@ -22,7 +22,7 @@ import numpy as np
 from pipeline.messages import Message
 from pipeline.records import Array, Centerline, Rejected
 from pipeline.settings.vision import VisionSettings
-from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight
+from pipeline.vision.centerline.axes_of_series import AxesTold, AxisSight, told_alone
 from pipeline.vision.centerline.continuation import continue_to_axes, sight_of_axes
 from pipeline.vision.centerline.curve_fit import CurveFit, length_std, slow_errors, std_along
 from pipeline.vision.centerline.ground_waves import HalfWidths, Waves, edge_waves, seen_waves
@@ -176,7 +176,23 @@ def _in_its_colours(
     metres = median(width / sections.width)
     light = sections.systematic_std * metres, LIGHT_LENGTH_SHARE * float(fit.s[-1] - fit.s[0])
     covariance = fit.smooth.covariance + slow_errors(fit, *light)
-    return Followed(rough, chord, sections, width, fit, covariance, light, diameter_m)
+    return _doubted(Followed(rough, chord, sections, width, fit, covariance, light, diameter_m))
+
+
+def _doubted(cable: Followed) -> Followed:
+    """The cable with covers that are not surely its own as unsure as they lie beside it, beyond what is expected.
+
+    A scalloped rim, or the arc in which a thin cable is cut off, tells a centre with less scatter than error; the cable
+    that passes it is another reading of it.
+    """
+    sight = cable.sight()
+    if sight is None:
+        return cable
+    expected = np.diag(sight.covariance + told_alone(sight).covariance)
+    beyond = np.sqrt(np.maximum(sight.miss**2 - expected, 0.0)) / median(cable.width / cable.sections.width)
+    doubted = [axis.kind == "cover" and not axis.sure for axis in cable.rough.axes]
+    left, right = np.hypot([axis.std_px for axis in cable.rough.axes], np.where(doubted, beyond, 0.0)).tolist()
+    return cable.loosened(left, right)
 
 
 def _with_ends(rough: RoughCable, ends_px: Array) -> RoughCable:
