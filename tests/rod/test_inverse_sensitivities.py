@@ -1,5 +1,7 @@
 """Columns of a fit against central differences of whole simulations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,7 +72,10 @@ FORMS = [(cause.name, form) for cause in CATALOGUE for form in range(len(cause.v
 def test_every_form_of_every_cause_moves_the_data_as_whole_simulations_say(name, form, monkeypatch):
     (cause,) = (cause for cause in CATALOGUE if cause.name == name)
     beside = next(one for one in CATALOGUE if one.name == ("in_plane_load" if name == "hysteresis" else "hysteresis"))
-    terms = (Term(cause, cause.variants(FACTS)[form]), Term(beside, beside.variants(FACTS)[0]))
+    variant = cause.variants(FACTS)[form]
+    if "width" in variant.tuned and variant.width == variant.width_range[0]:
+        variant = replace(variant, width=np.mean(variant.width_range))  # at an end of its range it moves to one side
+    terms = (Term(cause, variant), Term(beside, beside.variants(FACTS)[0]))
     extension = Extension(start(TEST, FACTS), FACTS, terms)
     vector = extension.start(extension.base.neutral(), (cause.plausible(FACTS), 0.2 * beside.plausible(FACTS)))
     observation, base_model = observe(TEST), extension.base_model(vector)
