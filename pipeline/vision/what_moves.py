@@ -31,7 +31,7 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
     # seven held at once tell the ground to half of a photo's noise
     chosen = sorted({alike[i] for i in np.linspace(0, len(alike) - 1, 7).astype(int)})
     photos = {k: photo for k in chosen if isinstance(photo := search.load(shots[k].step), Photo)}
-    held, sought = list(photos.values()), {k: shots[k] for k in alike}
+    held, sought = list(photos.values()), {k: shots[k] for k in alike if not _is_sure(search, shots[k])}
     farthest = max(photos, key=lambda k: abs(shots[k].step.displacement_m - shots[0].step.displacement_m))
     grounds = [Ground.of(held, colour) for colour in moved_colours(held)]
     tried = [(_searched(search, {farthest: shots[farthest]}, photos, ground).values(), ground) for ground in grounds]
@@ -64,6 +64,15 @@ def _searched(
         if isinstance(found, RoughCable):
             cables[k] = near = found
     return cables
+
+
+def _is_sure(search: Search, shot: Shot) -> bool:
+    """True if the cable was seen between two sure covers and is as long as a known scale says."""
+    if search.calibration is None or isinstance(shot.found, Rejected):
+        return False
+    length_px = search.calibration.scale.px_per_m * search.specimen.length_m
+    as_long = count_alike([shot], search.settings.series.max_length_deviation, length_px)
+    return bool(as_long and shot.found.left.sure and shot.found.right.sure)
 
 
 def _is_spoilt(shot: Shot) -> bool:

@@ -39,6 +39,7 @@ _REACH_RADII = 4.1
 """Radii; how far from where the cable's mask ends the centre of its cover may lie: a stub beyond it, or letters before
 it, are as long as a diameter.
 """
+_UNDER_RADII = 1.2  # radii from the centre of a cover; an end that is nearer is under it or meets its rim
 _EDGE_OVER_TEXTURE = 3.0  # ratio to the median gradient in the window; stronger edges count no more than this
 
 PixelPair = tuple[tuple[float, float], tuple[float, float]]
@@ -233,6 +234,9 @@ def find_bearings(
         # alike as a tenth (radii, rad and relative) show one cover or none
         known = np.concatenate([end.place / radius, end.outward, np.log([radius, width_px])])
         alike = [found for other, found in hints.sought if np.abs(known - other).max() < 0.1]
+        # nor do two covers overlap: an end within one that is surely seen is under that one
+        sure = (found for _, found in hints.sought if found is not None and found.sure)
+        alike += [one for one in sure if np.hypot(*(end.place - one.center)) < _UNDER_RADII * radius]
         if not alike:
             alike = [find_cover(photo, end, expected, width_px)]
             hints.sought.append((known, alike[0]))

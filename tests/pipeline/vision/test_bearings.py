@@ -157,9 +157,11 @@ def test_strips_that_end_alike_share_one_search(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr("pipeline.vision.bearings.covers.find_cover", searched)
     hints = BearingHints(cover_px=2.0 * radius)
-    for shift in (0.0, 0.05, 0.3):  # radii; the second is the same end, the third another
+    # radii; the second is the same end, the third lies under the cover that was seen, the fourth at none
+    for aside, early in ((0.0, 0.0), (0.05, 0.0), (0.3, 0.0), (0.0, 0.5)):
         ends = tuple(rough_end(picture, side, radius) for side in (0, 1))
-        moved = tuple(replace(end, place=end.place + shift * radius * np.array([0.0, 1.0])) for end in ends)
+        shifts = (radius * (aside * np.array([0.0, 1.0]) - early * end.outward) for end in ends)
+        moved = tuple(replace(end, place=end.place + shift) for end, shift in zip(ends, shifts, strict=True))
         axes = find_bearings(photo, moved, 41.0, hints)
         for axis, true in zip(axes, (picture.left_px, picture.right_px), strict=True):
             assert axis is not None

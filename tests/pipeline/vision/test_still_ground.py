@@ -3,6 +3,7 @@
 Pictures are drawn here by OpenCV, three times as large and then reduced: arcs of circles over a bed that stands still.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,9 +14,11 @@ from scipy.spatial import cKDTree
 
 from pipeline.records import CameraSpec, Centerline, LoadStep, RigSpec, Specimen
 from pipeline.settings.vision import VisionSettings
+from pipeline.vision import what_moves
 from pipeline.vision.photo import Photo
 from pipeline.vision.search import beyond
-from pipeline.vision.series import trace_series
+from pipeline.vision.series import given_calibration, trace_series
+from pipeline.vision.series_search import Search, Shot
 from pipeline.vision.still_ground import Ground, moved_colours
 
 SIZE, LENGTH, WIDTH, COVER = (1000, 420), 700.0, 16.0, 44.0  # px
@@ -93,6 +96,28 @@ def test_a_cable_across_slots_of_its_width_is_told_by_what_moves(colour: int, le
     off = [off_px(line, chord) for line, chord in zip(lines, CHORDS, strict=True) if isinstance(line, Centerline)]
     assert len(off) >= least
     assert max(off) < 0.25 * WIDTH and np.median(off) < 0.5
+
+
+def test_a_cable_seen_between_sure_covers_is_not_searched_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bed, settings = np.full((SIZE[1], SIZE[0], 3), (110.0, 130.0, 60.0)), VisionSettings()
+    series = specimen(tmp_path, bed, (60, 60, 60), covers=True)
+    (scale,) = given_calibration(series, settings)
+    search, calls = Search(series, settings, scale), []
+
+    def searched(search: Search, shots: dict[int, Shot], *rest: object) -> dict[int, object]:
+        calls.append(sorted(shots))
+        return dict.fromkeys(shots, whole)
+
+    shots = search.find_all()
+    whole = shots[0].found
+    for k in (1, 3):  # half of it was seen
+        shots[k] = replace(shots[k], found=replace(shots[k].found, path_px=shots[k].found.path_px[::2] / 2.0))
+    monkeypatch.setattr(what_moves, "_searched", searched)
+    found = what_moves.found_moving(search, shots)
+    assert calls[-1] == [1, 3] and all(len(call) == 1 for call in calls[:-2])
+    assert [new.found is old.found for new, old in zip(found, shots, strict=True)] == [True, False, True, False, True]
 
 
 def test_a_strip_beside_the_given_axes_is_not_the_cable(tmp_path: Path) -> None:
