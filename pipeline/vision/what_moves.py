@@ -20,7 +20,7 @@ def found_moving(search: Search, shots: list[Shot]) -> list[Shot]:
 
     Twice: by the colour of what moves in which the farthest photo shows the likeliest cable, then by that of the cables
     found. A cable that was seen as long on the same course before stays as it was found, if it was surely one, or as
-    likely.
+    likely; one between two sure covers, as long as a known scale says, is not sought again.
     """
     usable = {k: shot.size for k, shot in enumerate(shots) if shot.size is not None and not _is_spoilt(shot)}
     alike = [k for k, size in usable.items() if size in dict(Counter(usable.values()).most_common(1))]
