@@ -17,7 +17,7 @@ from rod.array import Array
 from rod.compliance_law import COEFFICIENTS, ComplianceLaw, refreshed
 from rod.inverse.base import ELEMENTS, Base, bent_at_rest, start
 from rod.inverse.extension import Extension
-from rod.inverse.fit import CRAWL_FAR, ITERATIONS, Fit, fit
+from rod.inverse.fit import ITERATIONS, Fit, fit
 from rod.inverse.laws import Abscissa, AnyLaw, FreeLaw, over_moments
 from rod.inverse.noise import calibrate_photo_noise
 from rod.inverse.observation import DISPLACEMENT_STD, SHAPE_FUNCTIONS, Observation, normal_distance, observe
@@ -144,7 +144,7 @@ def settled(observation: Observation, fitted: Fit, *, hopeless: float = np.inf) 
         gained = fitted.chi2 - _cost(further)
         if gained > 0.0:
             fitted = further
-        if gained < max(PAYS, CRAWL_FAR * fitted.chi2):
+        if gained < PAYS * max(fitted.reduced_chi2, 1.0):
             break
     return fitted
 

@@ -3,7 +3,8 @@
 What is fitted is an `extension.Extension`, the base model with or without causes added; rows and columns of the linear
 problem are those of `sensitivities`. One iteration takes the first of these that lowers chi-square: the whole
 step, a part of it, steps of rising damping (Levenberg, Marquardt). It ends when the linear model promises nothing more,
-when a step brought nothing, when it crawls, or when what is left could not save a model that lies too far behind.
+when a step brought nothing, when damped steps hardly bring anything, or when what is left could not save a model that
+lies too far behind.
 
 Nothing here raises for a model without equilibrium: the step is shortened, and a fit that cannot start says so in
 ``Fit.advice``.
@@ -31,12 +32,13 @@ ITERATIONS, TOLERANCE = 15, 1e-3
 FITS = 1.4
 """Reduced chi-square up to which a model explains the data: above it other starts and forms are tried."""
 
-CRAWL, PATIENCE = 2e-3, 4
-"""Share of chi-square; so many damped steps in succession that lower it by less lead nowhere in reasonable time."""
+KINKS = 1.0
+"""Chi-square, less than a sigma, times the reduced one where that is above 1. Where damped steps would not bring so
+much in all the steps left, none follows. What the linear model promises still is due to kinks (slip, set), which it
+does not see; where it promises more than that, the fit has stalled."""
 
-FAR, CRAWL_FAR = 16.0, 1e-2
-"""Reduced chi-square (4 sigma rms) beyond which a fit is none that anything is read from, and that share there: data
-that no model explains else kept every one of hundreds of fits at work on a hundredth of its misfit."""
+FAR = 16.0
+"""Reduced chi-square (4 sigma rms) beyond which a fit is none that anything is read from."""
 
 PROMISED = 4.0
 """Of what the linear model promises: as much as a fit is trusted to gain in all. Of 590 fits in nine trials one that
@@ -175,7 +177,7 @@ def fit(
             return begin
     jacobian = begin.jacobian
     rows = np.ones(len(state.residual), dtype=bool) if kept is None else kept
-    converged, damping, crawled, falls = False, 0.0, 0, [np.inf, np.inf]
+    converged, damping, falls = False, 0.0, [np.inf, np.inf]
     for left in range(iterations, 0, -1):
         cost = state.cost(rows)
         bounds = lasting(extension, state.vector)
@@ -189,7 +191,7 @@ def fit(
             break
         lower = _lower(observation, extension, state, linear, damping, rows)
         if lower is None:
-            converged = linear.expected_fall < 1.0  # rounding of kinks (slip, set) below a sigma; more is a stall
+            converged = linear.expected_fall < KINKS * left_over
             break
         raised, (state, damping) = lower[1] > damping > 0.0, lower
         jacobian = sensitivities(observation, extension, state.vector, state.base_model, state.run)
@@ -198,8 +200,8 @@ def fit(
         if fall < tolerance * left_over and damping == 0.0:
             converged = True
             break
-        crawled = crawled + 1 if damping > 0.0 and fall < (CRAWL if left_over < FAR else CRAWL_FAR) * cost else 0
-        if crawled == PATIENCE:
+        if damping > 0.0 and left * max(falls[-2:]) < KINKS * left_over:
+            converged = linear.expected_fall < KINKS * left_over
             break
         if not raised:  # what was too little a step ago is not tried again at once
             damping = 0.1 * damping if damping > 1e-4 else 0.0

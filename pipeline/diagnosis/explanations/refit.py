@@ -7,7 +7,7 @@ where the base model may have gone elsewhere.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -77,7 +77,6 @@ def fit_term(
     direction: int,
     *,
     hopeless: float = np.inf,
-    tuned: bool = True,
 ) -> Fit | None:
     """Fit a model with one further term, from every start that is worth trying; the best fit.
 
@@ -92,8 +91,6 @@ def fit_term(
         Of ``suspicion``, to become a term.
     hopeless : float
         Chi-square above which the fit is of no use.
-    tuned : bool
-        Whether place and time of the form are fitted too; else they stay as scored.
 
     Returns
     -------
@@ -101,8 +98,6 @@ def fit_term(
         None where the model has no equilibrium from any start, or where its score promises nothing of use.
     """
     term = suspicion.terms[direction]
-    if not tuned:
-        term = Term(term.cause, replace(term.variant, tuned=()))
     added = Addition(base, term, float(suspicion.scores.estimate[direction]), suspicion.columns[:, direction])
     best: Fit | None = None
     far = FAR * (len(base.residual) - added.extension.size)

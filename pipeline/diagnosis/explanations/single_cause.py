@@ -86,9 +86,11 @@ def _by_kind(
         term = suspicion.terms[direction]
         if term.size >= enough.get(term.variant.label, np.inf):
             continue
-        found = _fit_form(observation, base, suspicion, direction, hopeless=hopeless)
+        found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
         if found is None:
             continue
+        if not found.converged and found.chi2 < hopeless:
+            found = settled(observation, found)
         freedom = len(found.residual) - found.extension.size
         if found.converged and found.chi2 < freedom + 2.0 * np.sqrt(2.0 * freedom):
             enough[term.variant.label] = term.size
@@ -96,25 +98,6 @@ def _by_kind(
         if not (term.cause.additive or term.variant.component):  # of forms that stand alone those near the best stay
             hopeless = min(hopeless, found.chi2 + LEAST)
     return best
-
-
-def _fit_form(
-    observation: Observation,
-    base: Fit,
-    suspicion: Suspicion,
-    direction: int,
-    *,
-    hopeless: float,
-) -> Fit | None:
-    """Fit with one form in the model; place and width tuned unless that stalls (traces of slip have kinks)."""
-    found = fit_term(observation, base, suspicion, direction, hopeless=hopeless)
-    if found is None or found.converged:
-        return found
-    tried = [found if found.chi2 > hopeless else settled(observation, found)]
-    if suspicion.terms[direction].variant.tuned:
-        held = fit_term(observation, base, suspicion, direction, hopeless=hopeless, tuned=False)
-        tried += [] if held is None else [held]
-    return min((one for one in tried if one.run.prediction is not None), key=cost)
 
 
 def _first_forms(suspicion: Suspicion, cause: int) -> list[int]:
