@@ -37,9 +37,6 @@ KINKS = 1.0
 much in all the steps left, none follows. What the linear model promises still is due to kinks (slip, set), which it
 does not see; where it promises more than that, the fit has stalled."""
 
-FAR = 16.0
-"""Reduced chi-square (4 sigma rms) beyond which a fit is none that anything is read from."""
-
 PROMISED = 4.0
 """Of what the linear model promises: as much as a fit is trusted to gain in all. Of 590 fits in nine trials one that
 came near what another had reached gained more, 6.5 times (forces without a name, of no weight); of causes friction

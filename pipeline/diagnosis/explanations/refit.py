@@ -15,7 +15,7 @@ from pipeline.diagnosis.fits.search import TRACE, Suspicion
 from pipeline.diagnosis.posterior.products import WORSE
 from pipeline.records import Array
 from rod.inverse.extension import Extension, Term
-from rod.inverse.fit import FAR, PROMISED, Fit, State, fit, shown
+from rod.inverse.fit import PROMISED, Fit, State, fit, shown
 from rod.inverse.observation import Observation
 
 SHARES = (1.0, 0.3, 0.1)
@@ -100,8 +100,7 @@ def fit_term(
     term = suspicion.terms[direction]
     added = Addition(base, term, float(suspicion.scores.estimate[direction]), suspicion.columns[:, direction])
     best: Fit | None = None
-    far = FAR * (len(base.residual) - added.extension.size)
-    elsewhere = [start for start, spare in _elsewhere(added) if not spare or hopeless >= far]
+    elsewhere = _elsewhere(added)
     if not elsewhere and base.chi2 - PROMISED * suspicion.scores.z[direction] ** 2 > hopeless:
         return None
     for start in (linear_start(observation, added), *elsewhere):
@@ -140,20 +139,13 @@ def linear_start(observation: Observation, added: Addition) -> Array | State:
     return trials[-1] if best is None or best.run.prediction is None else best
 
 
-def _elsewhere(added: Addition) -> list[tuple[Array, bool]]:
-    """Further starts, and whether they are spare ones for where no other, of any cause, leads near the data.
-
-    With the law and K0 that photos show, with K0 of the other sign where it may be wrong, and with a constant law.
-    """
+def _elsewhere(added: Addition) -> list[Array]:
+    """Further starts: with K0 of the other sign, and with the law and K0 that photos show, where it may be wrong."""
     base, facts = added.base.extension.base, added.base.extension.facts
     at = base.pre_curvature_index
     if at is None or len(base.names) != len(added.base.vector):
         return []
-    K0, seen, neutral, mirrored = float(added.base.vector[at]), base.as_seen(), base.neutral(), base.neutral()
+    K0, seen, mirrored = float(added.base.vector[at]), base.as_seen(), base.neutral()
     mirrored[at] = -K0
-    found = [(seen, abs(float(seen[at]) - K0) <= ELSEWHERE * facts.curvature_scale)]
-    if "mounted" not in facts.branch:
-        found.append((mirrored, False))
-    if not np.array_equal(seen, neutral):  # of photos that tell nothing the two are the same start
-        found.append((neutral, True))
-    return [(added.start(vector), spare) for vector, spare in found]
+    far = abs(float(seen[at]) - K0) > ELSEWHERE * facts.curvature_scale
+    return [*([added.start(seen)] if far else []), *([added.start(mirrored)] if "mounted" not in facts.branch else [])]

@@ -40,8 +40,8 @@ BORDERLINE = [
     ("six", "rig_compliance", 1.0725e-6, DISPLACED, "rig_compliance displacement_offset"),
     ("six", "displacement_offset", 5.147e-5, DISPLACED, ""),
     ("six", "displacement_offset", 5.178e-5, DISPLACED, "displacement_offset"),
-    ("loop", "bearing_friction", 5.815e-5, TURNING_BACK, ""),
-    ("loop", "bearing_friction", 5.85e-5, TURNING_BACK, "bearing_friction"),
+    ("loop", "bearing_friction", 5.843e-5, TURNING_BACK, ""),
+    ("loop", "bearing_friction", 5.878e-5, TURNING_BACK, "bearing_friction"),
     ("loop", "force_offset", 0.01218, LOADS, ""),
     ("loop", "force_offset", 0.01225, LOADS, "force_offset"),
 ]
