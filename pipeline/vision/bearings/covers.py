@@ -234,8 +234,9 @@ def find_bearings(
         # alike as a tenth (radii, rad and relative) show one cover or none
         known = np.concatenate([end.place / radius, end.outward, np.log([radius, width_px])])
         alike = [found for other, found in hints.sought if np.abs(known - other).max() < 0.1]
-        # nor do two covers overlap: an end within one that is surely seen is under that one
-        sure = (found for _, found in hints.sought if found is not None and found.sure)
+        # nor do two covers overlap: an end within one of that size that is surely seen is under that one
+        as_large = (found for other, found in hints.sought if abs(known[4] - other[4]) < 0.1)
+        sure = (found for found in as_large if found is not None and found.sure)
         alike += [one for one in sure if np.hypot(*(end.place - one.center)) < _UNDER_RADII * radius]
         if not alike:
             alike = [find_cover(photo, end, expected, width_px)]
